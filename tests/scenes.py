@@ -123,12 +123,9 @@ def flying_beam(*, cells=10, time=lambda t: 1.0 * (t < 2.5), mass=1.0):
     )
 
 
-SPIN_UP = {"omega": 6.0, "duration": 15.0}
-
-
 def spin_up_angle(t):
     """Imposed angle of the spin-up manoeuvre; rad (Simo and Vu-Quoc 1986)."""
-    ω, T = SPIN_UP["omega"], SPIN_UP["duration"]
+    ω, T = 6.0, 15.0
     if t >= T:
         return ω * t - ω * T / 2
     turn = 2 * math.pi / T
@@ -167,17 +164,4 @@ def swing(*, cells=4, rigidity=1e4):
         supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
         loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), amplitude=SWING_PULSE)],
-    )
-
-
-def double_pendulum(*, cells=4, EI=100.0):
-    """Two beams of 1 m along x, hinged to the origin and to each other, falling from rest."""
-    section = ub.Section(EA=1e4 * EI, GA=1e4 * EI, EI=EI, rhoA=1.0, rhoI=1e-3)
-    upper = ub.Beam((0, 0), (1, 0), section, cells=cells, name="upper")
-    lower = ub.Beam((1, 0), (2, 0), section, cells=cells, name="lower")
-    return ub.Scene(
-        [upper, lower],
-        joints=[ub.Revolute(upper.end, lower.start)],
-        supports=[ub.Pinned(upper.start)],
-        loads=[ub.Gravity()],
     )

@@ -3,15 +3,14 @@
 
 `script(seed, statement)` writes Python that makes `scene`, `scheme`, `times`, `dt` and `mesh`.  All
 draws are those of the seed; the statement decides only how the scene is stated.  Sizes follow from
-what the first beam makes natural: its length L, EI/L², its period.  They make motions that are
-large and yet regular: a scene whose motion depends on its last digits would show nothing.
-
-Scattered limits depend on where beams begin and end, to the last digit.  Scenes that have them can
-be compared in another order only.
+the length L of the first beam, EI/L² and its period; they make motions that are large and yet
+regular.  Scattered limits depend on where beams begin and end, to the last digit: scenes that have
+them can be compared in another order only.
 """
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from random_laws import IMPORTS, Laws
@@ -32,7 +31,7 @@ def script(seed, statement=AS_GIVEN):
     return _Writer(seed, statement).source() + "\n"
 
 
-class _Anchor:
+class _Anchor(NamedTuple):
     """A place on a beam, a point of a body or of the ground.
 
     Attributes:
@@ -42,8 +41,10 @@ class _Anchor:
         is_end: Whether it is an end of a beam.
     """
 
-    def __init__(self, text, point, part, is_end=False):
-        self.text, self.point, self.part, self.is_end = text, point, part, is_end
+    text: str
+    point: tuple
+    part: str
+    is_end: bool = False
 
     def __str__(self):
         return self.text
@@ -60,7 +61,7 @@ class _Writer(Laws):
         self._lists = {name: [] for name in PARTS}
         title = f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}"
         self._lines = [title, *IMPORTS]
-        self._statement, self._parts, self._anchors = statement, [], []
+        self._statement, self._anchors = statement, []
         self._flips = np.random.default_rng(statement.backwards)
         self._order = np.random.default_rng(statement.shuffled)
         self._scales()
@@ -68,7 +69,8 @@ class _Writer(Laws):
         self._elastic = self._chance(0.3) and not self._scattered
         self._beam(None)
         for _ in range(self._integer(0, 3)):
-            self._part()
+            parent = self._one(self._anchors)
+            (self._beam if self._chance(0.65) else self._body)(parent)
         self._root()
         self._second_support()
         for _ in range(self._integer(0, 2)):
@@ -135,7 +137,7 @@ class _Writer(Laws):
 
     def _beam(self, parent):
         """A beam, joined to an anchor if there is one."""
-        i = sum(part.startswith("beam") for part in self._parts)
+        i = len(self._lists["beams"])
         name = f"beam{i}"
         _, hinges = self._section(i)
         joint, gap = self._kind_of_joint(parent)
@@ -153,7 +155,6 @@ class _Writer(Laws):
             more += f", hinges={{{', '.join(f'{s!r}: {law}' for s, law in laws.items())}}}"
         way = f"  # {name} runs backwards" if backwards else ""
         self._lines.append(f"{name} = ub.Beam{text}, {more}){way}")
-        self._parts.append(name)
         self._lists["beams"].append(name)
 
         def at(s):
@@ -215,38 +216,26 @@ class _Writer(Laws):
             b = [(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3]
             return tuple(sum(w * p[k] for w, p in zip(b, points, strict=True)) for k in (0, 1))
 
-        a, b, c, d = self._ends(points, backwards)
         lines = (
-            f"lambda s, p=({a}, {b}, {c}, {d}): tuple((1 - s)**3 * p[0][k] + "
+            f"lambda s, p=({', '.join(self._ends(points, backwards))}): tuple((1 - s)**3 * p[0][k] + "
             "3 * s * (1 - s)**2 * p[1][k] + 3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] "
             "for k in (0, 1))"
         )
         return axis, f".along({lines}"
 
-    def _part(self):
-        parent = self._one(self._anchors)
-        if self._chance(0.65):
-            self._beam(parent)
-        else:
-            self._body(parent)
-
     def _body(self, parent):
-        i = sum(part.startswith("body") for part in self._parts)
-        name, say = f"body{i}", self._say
+        name, say = f"body{len(self._lists['bodies'])}", self._say
         mass = self._rhoA * self._L * self._size(-0.5, 1)
         inertia = mass * self._L**2 * self._size(-1.5, -0.5)
         joint = self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
-        if self._static and joint == "Revolute":
-            joint = "Rigid"
+        joint = "Rigid" if self._static and joint == "Revolute" else joint
         away = tuple(self._L * self._some(-0.3, 0.3) for _ in range(2))
         if self._chance(0.3) or not self._may_hold:
             away = (0.0, 0.0)
         middle = tuple(np.add(parent.point, away))
-        self._lines.append(
-            f"{name} = ub.Body({say.point(middle)}, mass={say.number(mass, 'kg')}, "
-            f"inertia={say.number(inertia, 'kg m2')}, name='{name}')"
-        )
-        self._parts.append(name)
+        numbers = f"{say.point(middle)}, mass={say.number(mass, 'kg')}"
+        numbers += f", inertia={say.number(inertia, 'kg m2')}"
+        self._lines.append(f"{name} = ub.Body({numbers}, name='{name}')")
         self._lists["bodies"].append(name)
         center = _Anchor(f"{name}.middle", middle, name)
 
@@ -349,10 +338,9 @@ class _Writer(Laws):
             moving = list(self._lists["beams"] + self._lists["bodies"])
             self._shuffle(moving)
             linear = say.vector(linear, "m/s") if kind == "free" else "(0.0, 0.0)"
-            self._lists["initial"].append(
-                f"ub.Velocity([{', '.join(moving)}], linear={linear}, "
-                f"angular={say.number(angular, '1/s')}, about={say.point(place.point)})"
-            )
+            motion = f"linear={linear}, angular={say.number(angular, '1/s')}"
+            motion += f", about={say.point(place.point)}"
+            self._lists["initial"].append(f"ub.Velocity([{', '.join(moving)}], {motion})")
 
     def _second_support(self):
         """Often the end of the last beam is held, too."""
@@ -372,10 +360,9 @@ class _Writer(Laws):
         angle, bend = self._some(-math.pi, math.pi), self._some(-0.5, 0.5) / self._L
         t = self._say.vector((math.cos(angle), math.sin(angle)))
         n = self._say.vector((-math.sin(angle), math.cos(angle)))
-        self._lists["joints"].append(
-            f"ub.Guided({place}, lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple("
-            f"p[k] + s * t[k] + {self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1)))"
-        )
+        curve = f"lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple(p[k] + s * t[k] + "
+        curve += f"{self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1))"
+        self._lists["joints"].append(f"ub.Guided({place}, {curve})")
 
     # -- loads, masses, damping ----------------------------------------------------------------
 
@@ -405,40 +392,33 @@ class _Writer(Laws):
         inertia = self._one([0.0, mass * self._L**2 * self._size(-2, -1)])
         place, say = self._one([a for a in self._anchors if a.part.startswith("beam")]), self._say
         if self._chance(0.3):
-            self._lists["masses"].append(
-                f"ub.PointMass({place}, {say.number(mass, 'kg')}, {say.number(inertia, 'kg m2')})"
-            )
+            numbers = f"{say.number(mass, 'kg')}, {say.number(inertia, 'kg m2')}"
+            self._lists["masses"].append(f"ub.PointMass({place}, {numbers})")
 
     def _damp(self):
         mass, stiffness = self._size(-3, -1) / self._T, self._size(-4, -2) * self._T
-        beams = list(self._lists["beams"][:1])
-        viscous = self._say.number(self._size(-4, -1) * self._T, "s")
+        say, damping = self._say.number, self._lists["damping"]
+        viscous = say(self._size(-4, -1) * self._T, "s")
         kind = self._one(["", "", "Rayleigh", "KelvinVoigt", "both"])
         if kind in ("Rayleigh", "both") and not self._static:
-            self._lists["damping"].append(
-                f"ub.Rayleigh(mass={self._say.number(mass, '1/s')}, "
-                f"stiffness={self._say.number(stiffness, 's')})"
-            )
-        if kind == "KelvinVoigt":
-            self._lists["damping"].append(f"ub.KelvinVoigt({viscous})")
-        if kind == "both":
-            self._lists["damping"].append(f"ub.KelvinVoigt({viscous}, beams=[{', '.join(beams)}])")
+            factors = f"mass={say(mass, '1/s')}, stiffness={say(stiffness, 's')}"
+            damping.append(f"ub.Rayleigh({factors})")
+        if kind in ("KelvinVoigt", "both"):
+            beams = ", beams=[beam0]" if kind == "both" else ""
+            damping.append(f"ub.KelvinVoigt({viscous}{beams})")
 
     def _frame(self):
         """A frame that turns, with so much centrifugal force as other loads."""
         rate, about = self._some(-1, 1) / self._T, self._polar(self._L)
         turns = self._chance(0.15)
         if turns and (self._rubs or self._name == "Static()"):
-            self._lists["loads"].append(
-                f"ub.RotatingFrame({self._say.number(rate, '1/s')}, about={self._say.point(about)})"
-            )
+            rate, about = self._say.number(rate, "1/s"), self._say.point(about)
+            self._lists["loads"].append(f"ub.RotatingFrame({rate}, about={about})")
 
     def _mesh(self):
         refine, degree = self._one([1, 1, 1, 2]), self._one([1, 1, 2, 3])
-        lumped = self._chance(0.2)
-        self._lines.append(
-            f"mesh = ub.Mesh({refine}, degree={degree if self._elastic else 1}, lumped={lumped})"
-        )
+        lumped, degree = self._chance(0.2), degree if self._elastic else 1
+        self._lines.append(f"mesh = ub.Mesh({refine}, degree={degree}, lumped={lumped})")
 
     # -- the end -------------------------------------------------------------------------------
 
