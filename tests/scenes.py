@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Catalogue of scenes for tests and benchmarks: each cheap, parametrised, and a plain `ub.Scene`.
+"""Scenes of tests and benchmarks; lengths in m, SI units, unless a source has none.
 
 The beam to look at is `scene.beams[0]`, the support `scene.supports[0]`.
-Sources are named where a scene is somebody's; lengths in m, SI units, unless a source has none.
 """
 
 import math
@@ -46,12 +45,7 @@ def cantilever(
     load=ub.PointLoad,
     loads=(),
 ):
-    """Beam along x, clamped at the origin, with `load(...)` at its end and any other `loads`.
-
-    Args:
-        load: `ub.PointLoad` or `ub.FollowerLoad`.
-        loads: Functions of the beam that give more loads, `lambda beam: ub.LineLoad(beam, ...)`.
-    """
+    """Beam along x, clamped, with `load(...)` at its end; `loads`: functions of the beam."""
     beam = ub.Beam((0, 0), (length, 0), section, cells=cells)
     at_end = [load(beam.end, force=force, moment=moment, amplitude=time)]
     return clamped(beam, loads=at_end + [further(beam) for further in loads])
@@ -97,11 +91,7 @@ def portal(*, cells=4, H=20e3, V=-40e3, time=GROWING, feet=ub.Clamped):
 
 
 def struck_portal(*, hinges=None):
-    """Steel portal under a blow of half a sine, within 20 ms, at its corner, the end of beam 0.
-
-    Args:
-        hinges: Those of the column that is struck, as of `ub.Beam`.
-    """
+    """Steel portal under a blow of 20 ms at its corner, the end of beam 0, which has the hinges."""
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
     left = ub.Beam((0, 0), (0, 3), section, cells=3, hinges=hinges or {})
     roof = ub.Beam((0, 3), (4, 3), section, cells=4)
@@ -148,9 +138,7 @@ SWING_PULSE = ub.Table([0, 0.128, 0.256], [0, 2, 0])
 def swing(*, cells=4, rigidity=1e4):
     """Beam of 0.72 m with a mass at mid-span, hung on two links; no gravity (Bauchau and Theron).
 
-    Args:
-        cells: Cells of the beam; even, since the mass is at mid-span.
-        rigidity: The links, massless beams of one cell, are so many times as stiff as the beam.
+    The beam has an even number of cells; links are `rigidity` times as stiff.
     """
     EA, GA, EI = 3.65e5, 1.17e5, 0.0304166667
     flexible = ub.Section(EA=EA, GA=GA, EI=EI, rhoA=0.0135, rhoI=1.125e-9)

@@ -260,10 +260,7 @@ class AirDrag(ub.extend.Statement):
 
 @dataclass(frozen=True)
 class MaxwellElement(ub.extend.Statement):
-    """Spring and dashpot in a row along y between two places; the dashpot has grown by ``flow``.
-
-    The force k (e - flow) and the growth of the dashpot belong to the same time.
-    """
+    """Spring and dashpot in a row along y; the dashpot has grown by ``flow``."""
 
     nodes = 2
     numbers = "k", "time"

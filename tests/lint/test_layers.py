@@ -25,10 +25,7 @@ SUBPACKAGES = [
     *("", "model", "compiled", "mechanics", "discretization", "terms", "blocks"),
     *("solvers", "output", "reference", "simulation", "analysis", "plotting", "structures"),
 ]
-"""From the lowest to the highest; the first one is the package itself.
-
-A module imports from its own subpackage and from those before it.
-"""
+"""From the lowest to the highest; a module imports from its own and from those before it."""
 
 C_FILES = {
     "compiled": "assembly csr",
@@ -197,10 +194,7 @@ def test_c_functions_call_no_higher_subpackage():
 
 
 def test_a_step_enters_each_subpackage_once():
-    """From one place of Python, a chain of calls of C enters each subpackage once.
-
-    Steps and Newton's method call terms and blocks by their addresses, see `loop`.
-    """
+    """From one place of Python, calls of C enter each subpackage once; see `loop` for addresses."""
     entries = [(x, subpackage(m)) for m in FILES for x in used_in_c(m) if x in STEPS]
     assert sorted(entries) == [(x, "simulation") for x in sorted(STEPS)]
     chains = ways("take_steps")

@@ -67,7 +67,15 @@ def test_the_public_address_has_one_place():
     """The table `[project.urls]`; a guess elsewhere would lead to the pages of strangers."""
     address = re.compile(r"(?:https?://|ssh://|git@)[^\s\"'<>)]*ufl[-_]beam[^\s\"'<>)]*")
     kinds = {".md", ".py", ".cff", ".yml", ".yaml", ".json", ".toml", ""}
-    folders = ".ci/", ".devcontainer/", ".github/**/", "docs/", "demos/", "ufl_beam/**/", "tests/**/"
+    folders = (
+        ".ci/",
+        ".devcontainer/",
+        ".github/**/",
+        "docs/",
+        "demos/",
+        "ufl_beam/**/",
+        "tests/**/",
+    )
     paths = [path for folder in ("", *folders) for path in ROOT.glob(f"{folder}*")]
     files = [path for path in paths if path.suffix in kinds and path.is_file()]
     assert len(files) > 300

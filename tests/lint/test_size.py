@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Size of the package: lines of Python and C, which grow only with a reason.
+"""Size of the package: lines of Python and C; a commit that raises a limit states the reason.
 
-Effects move from the terms of the old core to statements in ``blocks/``.  A commit that moves an
-effect lowers the limit of the other subpackages.  A commit that raises a limit has the reason in
-its message.
+Effects move from the terms of the old core to ``blocks/``, which lowers the other limits.
 """
 
 from pathlib import Path

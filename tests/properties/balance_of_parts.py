@@ -13,10 +13,7 @@ GAUSS = np.polynomial.legendre.leggauss(5)
 
 
 class Balance:
-    """Forces and moments on the parts of a scene in the last state of a static run.
-
-    Vectors of the plane are (3,): force, and moment about the origin; N, N m.
-    """
+    """Forces and moments about the origin on parts of a scene at the end of a static run; (3,)."""
 
     def __init__(self, names, solution):
         self.scene, self.solution, self.t = names["scene"], solution, solution.times[-1]

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Runs of a combination, comparisons of their results, and the list of checks.
 
-A check takes a :class:`Case`.  It raises :class:`NotApplicable` where the combination is none for
-it, and AssertionError where results differ: a flag.
+A check raises :class:`NotApplicable` where the combination is none for it, and AssertionError where
+results differ.
 """
 
 import warnings
@@ -22,11 +22,8 @@ DIGITS = 1e-12
 """Tolerance of Newton's method in runs whose results are compared as numbers."""
 
 SAME = 1e-7
-"""Difference of two runs to :data:`DIGITS`, as a part of the largest value.
-
-Each of some 20 steps leaves 1e-12 of the forces; stiffnesses of the combinations differ by factors
-of up to 1e3, and displacements are up to 1e-2 of what these forces would make.
-"""
+"""Difference of two runs to :data:`DIGITS`, as a part of the largest value: each of some 20 steps
+leaves 1e-12 of the forces, stiffnesses differ by factors of up to 1e3."""
 
 
 class NotApplicable(Exception):
@@ -129,10 +126,7 @@ def results(names, solution, rows=slice(None)):
 
 
 def differences(one, other, rows=slice(None)):
-    """Largest differences of two runs by kind; of the second those of some rows.
-
-    Energies that were supplied and lost count from the first of the rows on.
-    """
+    """Largest differences of two runs by kind; of some rows of the second, as if it began there."""
     a, b = results(one.names, one.solution), results(other.names, other.solution, rows)
     forces = max((np.nanmax(np.abs(x), initial=0.0) for x, _ in b.values()), default=1.0)
     found = {}

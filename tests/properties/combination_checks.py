@@ -31,10 +31,7 @@ from ufl_beam.simulation.reference_run import require_scope
 
 @check
 def failed_step(case):
-    """A step that fails says why: what breaks or flows in statics has limit loads.
-
-    Longer steps may leap over a limit that smaller ones meet, and the other way round.
-    """
+    """A step that fails says why; longer steps may leap over a limit load of smaller ones."""
     only(case.whole.failure, "all steps converged")
     causes = "limit load", "mechanism has formed", "smaller dt"
     assert any(words in case.whole.failure for words in causes), case.whole.failure
@@ -44,9 +41,8 @@ def failed_step(case):
 def ledger(case):
     """It closes as the scheme claims; what was lost never comes back, to digits of the whole.
 
-    `EnergyMomentumDecaying` may give back a part of its own loss, but no more than that.  Laws with
-    memory have errors of steps of both signs, and steel that of the Bauschinger effect.  Hinges
-    whose unloading stiffness falls store more at the same moment.
+    `EnergyMomentumDecaying` may give back a part of its own loss.  Laws with memory have errors of
+    steps of both signs; hinges whose unloading stiffness falls store more at the same moment.
     """
     solution = case.whole.solution
     assert solution.imbalance_message == ""
@@ -65,11 +61,9 @@ def ledger(case):
 def ledger_of_small_steps(case):
     """A ledger by trapezes, of second order where nothing yields, closes with smaller steps.
 
-    A quarter of the step leaves a sixteenth of the imbalance; of yielding, sliding and contact
-    within a step a quarter.  Steps must resolve the periods of the mesh for that, some 1e-3 s, and
-    in statics the creep of Kelvin and Voigt's damping.  Under loads that are there from the start
-    a step of x retardation times leaves x/(2 + x)/(1 + x)² of the energy that creep stores: with
-    x > 1 less than with shorter ones, as most of it is in the first step, which does not count.
+    A quarter of the step leaves a sixteenth of the imbalance; of yielding, sliding and contact a
+    quarter.  Steps must resolve periods of the mesh, some 1e-3 s, in statics the creep of Kelvin
+    and Voigt's damping: of longer steps, most of the imbalance is in the first one.
     """
     only(not case.combination.has_exact_ledger, "the scheme closes its ledger")
     only(case.equal_steps and not case.whole.failure, "steps are not equal")
@@ -89,10 +83,7 @@ def ledger_of_small_steps(case):
 
 
 def imbalance(run):
-    """Largest imbalance, as a part of the energy that went through.
-
-    In statics the first trapeze, from rest to loads that are there from the start, does not count.
-    """
+    """Largest imbalance over the energy that went through; in statics without the first trapeze."""
     energy, first = run.solution.energy, 0 if len(run.solution.v) else 1
     return np.ptp(energy.imbalance[first:]) / (energy.energy_transferred or 1.0)
 
@@ -142,10 +133,7 @@ def resumed(case):
 
 @check
 def saved(case):
-    """A saved and loaded solution has the same results and texts.
-
-    Guide curves are saved as points, so that the directions of their forces have fewer digits.
-    """
+    """A loaded solution has the same results and texts; guide curves are saved as points."""
     own = *LAWS, *SOFTENING, *CONNECTOR_LAWS, "ub.Effect"
     only(not case.combination.has(*own), "own laws cannot be saved")
     before = case.whole.solution
@@ -203,10 +191,7 @@ def recorders(case):
 
 @check
 def engineering(case):
-    """Hinges of beams dissipate what their cells do; accelerations add up to velocities.
-
-    The sums are taken in another order.  Drifts are differences of displacements.
-    """
+    """Hinges of beams dissipate what their cells do; accelerations add up to velocities; drifts."""
     solution, scene = case.whole.solution, case.whole.names["scene"]
     rows, (_, lost) = st.hinge_table(solution, only=scene.beams).rows, solution.damage()
     assert difference(sum(row.dissipated for row in rows), lost.sum(), lost.sum() or 1.0) < 1e-12
@@ -274,9 +259,8 @@ class StepsAreCut(AssertionError):
 def assert_agree(case, tolerance=SAME, **changes):
     """Runs with other arguments find the motions, forces and energies of `exact`.
 
-    Where one of both must cut a step, last digits decide, and other steps have other errors; then
-    smaller steps, which none must cut, are compared.  Beyond a limit load there are none: however
-    short its steps are, the state leaps, and what flows remembers in how many parts.
+    Where one must cut a step, last digits decide: then smaller steps, which none must cut, are
+    compared.  Beyond a limit load there are none: the state leaps, however short its steps are.
     """
     only(not case.exact.failure, "a step fails")
     for parts in (1, 4, 16):
@@ -301,11 +285,7 @@ def assert_agree(case, tolerance=SAME, **changes):
 
 
 def leaps(case, short):
-    """Whether in statics a state leaps in steps of a sixteenth, as it does in whole ones.
-
-    A motion without leaps is a sixteenth as far in one of them; four times as much is no such
-    motion.  The first step does not count: it applies loads that are there from the start.
-    """
+    """Whether in statics a state leaps in a step but the first: as far as four short steps."""
     return case.combination.static and farthest(short) > 4 / 16 * farthest(case.exact)
 
 
@@ -354,8 +334,7 @@ def reference(case):
 def with_guesses(case, newton):
     """The run of the reference solver whose guesses are the ends of steps of `exact`.
 
-    A long step may have several equilibria where much softens in it, and last digits decide which
-    one is found.  If a solver takes the states of the other for equilibria, it has the same laws.
+    A long step may have several equilibria where much softens in it, and last digits decide.
     """
     ends, q = case.exact.solution.times, case.exact.solution.q
     find, solve, times = Solver._equilibrium, Solver._solve, [0.0, 0.0]

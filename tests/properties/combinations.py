@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Combinations of 2 to 5 features in small models, each a script that anybody can run.
-
-`draw(seed)` draws a model of one to three beams and its features from those of :mod:`features`.
-"""
+"""Combinations of 2 to 5 features in small models, each a script that anybody can run."""
 
 import math
 import re
@@ -60,13 +57,7 @@ from user_classes import *
 
 @dataclass
 class Draft:
-    """A model while features write into it.
-
-    Attributes:
-        beams: Numbers of each: ends a and b, cells, section, kind of axis, hinges.
-        last: Name of the beam whose end is the `tip`.
-        end: Time of the run; s.
-    """
+    """A model while features write into it; `last`: name of the beam whose end is the `tip`."""
 
     random: np.random.Generator
     static: bool
@@ -193,11 +184,7 @@ def _axis(kind, a, b):
 
 @dataclass(frozen=True)
 class Combination:
-    """A drawn model.
-
-    Attributes:
-        source: Script that makes `scene`, `scheme`, `t`, `dt`, `mesh` and `newton`.
-    """
+    """A drawn model: a script that makes `scene`, `scheme`, `t`, `dt`, `mesh` and `newton`."""
 
     seed: int
     base: str

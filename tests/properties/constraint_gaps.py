@@ -13,11 +13,7 @@ from ufl_beam.model.joints import Joint
 
 
 def largest_gap(solution, size):
-    """Largest distance from what is promised, as a part of the size of the scene, or in rad.
-
-    Returns:
-        The distance, and whose promise it is.
-    """
+    """Largest distance from a promise over the size of the scene or in rad; whose promise it is."""
     gaps = [(0.0, "nobody")]
     for one in (*solution.scene.joints, *solution.scene.supports, *solution.scene.connectors):
         for moved, turned in _misses(solution, one):

@@ -22,13 +22,7 @@ CHANGES = 1e-3, 1e-4, 1e-5, 1e-6, 1e-7
 
 
 class Case(NamedTuple):
-    """A combination with the factor ``x`` of one of its numbers.
-
-    Attributes:
-        model: Function of x that returns the scene.
-        run: Scheme, times, step and mesh, as arguments of ``simulate``.
-        number: The number with its line.
-    """
+    """Function of a factor of a number of a combination, arguments of its run, and the number."""
 
     model: object
     run: dict
@@ -62,8 +56,7 @@ class Outcome(NamedTuple):
     Attributes:
         kind: "agrees", "switches", "differs", "refused" or "failed".
         error: Least error, relative to the size of the derivative.
-        digits: Least change of the differences from one change of x to the next, in the same unit.
-        words: Message of a refusal or failure, or the range.
+        digits: Least change of differences from one change of x to the next, in the same unit.
     """
 
     kind: str
@@ -73,10 +66,7 @@ class Outcome(NamedTuple):
 
 
 def outcome(one):
-    """Compare the derivative of the motion with differences of runs.
-
-    Near limit loads runs to 1e-13 have errors of 1e-6, and are solved further.
-    """
+    """Compare with differences of runs; of better ones where those to 1e-13 have large errors."""
     for newton in (TIGHT, ub.Newton(rtol=1e-15)):
         found = compare(one, newton)
         if found.kind != "differs":

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random elastic scenes as plain numbers, and the ways to state one scene that must not matter.
 
-A draw is a tree of one to four beams, each joined to an earlier one, with supports, loads and
-masses.  `Built` states it in other units, turned, or with beams cut in two; results at its places
-must then be the same, scaled and turned.
+A draw is a tree of one to four beams.  `Built` states it in other units, turned, or with beams cut
+in two; results at its places must then be the same, scaled and turned.
 """
 
 import math
@@ -33,16 +32,13 @@ SECTION = {
 
 
 class Draw:
-    """The numbers of a scene, in SI.
+    """The numbers of a scene, in SI; places are (beam, s).
 
     Attributes:
         beams: (start, end, section, cells) of each.
-        joints: (kind, place, place); a place is (beam, s).
-        supports: (kind, place, direction in rad).
+        joints, supports: (kind, place, place), (kind, place, direction in rad).
         forces: (kind, place, force, moment, duration of the ramp).
-        lines: (beam, force).
-        masses: (place, mass, inertia).
-        gravity: (g_x, g_y), or None.
+        lines, masses: (beam, force), (place, mass, inertia).
         throw: (linear, angular), or None: a rigid motion of the whole scene.
     """
 
@@ -53,13 +49,7 @@ class Draw:
 
 
 def draw(seed, *, free=False, fixed=False, dead=False):
-    """A random scene.
-
-    Args:
-        free: Without supports.
-        fixed: One that cannot move without strain, for statics: the tree is clamped at its root.
-        dead: Without follower loads.
-    """
+    """A random scene: free, clamped at its root for statics, without follower loads (`dead`)."""
     random = np.random.default_rng(seed)
 
     def some(low, high):
@@ -111,12 +101,7 @@ def draw(seed, *, free=False, fixed=False, dead=False):
 
 
 class Built:
-    """A draw as a scene, in the units and axes of a statement.
-
-    Attributes:
-        scene: The scene.
-        supports: Its supports in the order of the draw.
-    """
+    """A draw as a scene, in the units and axes of a statement."""
 
     def __init__(self, draw, statement=AS_GIVEN, *, cut=()):
         self.draw, self.statement, unit = draw, statement, statement.unit
@@ -231,10 +216,7 @@ def in_pieces(pieces, s):
 
 
 def difference(one, other):
-    """Largest difference of two results, each kind as a part of its largest value.
-
-    Energies count as parts of the energy that went through.
-    """
+    """Largest difference of two results, over the largest value of each kind or the throughput."""
     parts = [relative(a, b) for a, b in zip(one.results(), other.results(), strict=True)]
     first, second = one.energies(), other.energies()
     assert first.keys() == second.keys()

@@ -23,9 +23,8 @@ differences of positions magnify; V follows from moments of cells of a quarter o
 def equilibrium(case):
     """In statics N, V, M at both ends of each cell bear its loads, and jump by what acts at nodes.
 
-    Loads of a cell are integrated anew; a support, connector or joint bears what the nodes of the
-    parts that it holds miss.  Quadratures of works and fields of forces are those of the cells, of
-    degree 2, which are exact for all but the field of magnets.
+    A support, connector or joint bears what the nodes of its parts miss.  Quadratures are those of
+    the cells, of degree 2, exact for all but the field of magnets.
     """
     words = case.combination
     only(words.has("scheme = ub.Static("), "forces of a step act at its end in Static only")
@@ -52,11 +51,7 @@ def equilibrium(case):
 
 @check
 def jumps(case):
-    """In all schemes N, V, M jump at no vertex where nothing is, and are zero at free ends.
-
-    Where only a support is, they are its reaction.  Axes turn at corners and hinges; so forces are
-    compared by their size.
-    """
+    """N, V, M jump at no vertex where nothing is; at ends they are zero or the reaction; sizes."""
     only(not case.exact.failure, "a step fails")
     scene, solution = case.exact.names["scene"], case.exact.solution
     attached, supports = {}, {}
@@ -93,10 +88,7 @@ def jumps(case):
 
 @check
 def momentum(case):
-    """In midpoint rules linear momentum grows by the impulses of loads, supports and the ground.
-
-    Tolerance: 1e-12 of the forces in each step, which are up to 1e3 times those of loads.
-    """
+    """In midpoint rules linear momentum grows by the impulses of loads, supports and the ground."""
     words = case.combination
     only(
         words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted")
@@ -186,9 +178,8 @@ def _turned(angles):
 def modes(case):
     """Modes about a static state are those of the motion after a small step of a load.
 
-    With s dt = 2 (z - 1)/(z + 1) in the midpoint rule, all states lie in the span of zⁿ of all
-    modes.  Twenty are taken: those left out have less than 1/100 of the first amplitude, squared
-    frequencies growing as n⁴ in beams and as n² in bars.
+    With s dt = 2 (z - 1)/(z + 1) in the midpoint rule, states lie in the span of zⁿ of all modes.
+    Those beyond 20 have less than 1/100 of the first amplitude.
     """
     words = case.combination
     only(words.has("scheme = ub.Static(") and words.elastic, "not elastic, or no equilibrium at T")
@@ -248,8 +239,7 @@ def modes(case):
 def _require_linear_model(still, held, push, place, state, shapes):
     """The linear model has the exponents of the modes, and one response in all its forms.
 
-    LAPACK finds exponents from first-order equations with an error of 1e-14 of the largest one;
-    an error of the square of a small exponent counts.
+    Exponents of first-order equations have errors of 1e-14 of the largest one, in the square.
     """
     push = replace(push, force=(0.6, 0.8), amplitude=lambda t: float(t > state.times[-1]))
     model = ub.linearize(
@@ -285,8 +275,7 @@ IN_TIME = ("Controller", "state=", "Perzyna", "DuvautLions", "Dashpot", "KelvinV
 def path(case):
     """`follow` with equal steps of the load factor passes the states of `Static`.
 
-    Where a step was cut, or loads stay as they are, there are no common factors any more.  Loads
-    that act at the factor 0 come alone on a path, and with others in the first step of `Static`;
+    Loads that act at the factor 0 come alone on a path, with others in the first step of `Static`;
     what has a history remembers that, and also the factors at which one of both was alone.
     """
     words = case.combination
@@ -327,10 +316,7 @@ def path(case):
 
 @check
 def buckles(case):
-    """The first critical point of a straight column is a bifurcation at its factor of `buckling`.
-
-    They differ by the strain before buckling, up to its double in shear.
-    """
+    """The first critical point of a straight column is a bifurcation, at its buckling load."""
     only(case.combination.base == "column", "no straight column")
     names = case.combination.make()
     scene, mesh = names["scene"], names["mesh"]

@@ -46,13 +46,7 @@ class Laws(Draws):
     """The part of the writer of random scenes that draws laws."""
 
     def _hardening(self, limit, stiffness, dimensions):
-        """A law that yields.
-
-        Args:
-            limit: Text.
-            stiffness: In SI.
-            dimensions: Those of the stiffness, and of the viscosity.
-        """
+        """A law that yields at a limit (text); dimensions of the stiffness and of the viscosity."""
         say, (of_stiffness, of_viscosity) = self._say, dimensions
         modulus, kinematic = (stiffness * self._size(-2, -0.5) for _ in range(2))
         time = self._end * self._size(-1, 1)
@@ -69,10 +63,7 @@ class Laws(Draws):
         return f"ub.ElastoPlastic({', '.join(more)})"
 
     def _yielding(self, name, limit, size, stiffness, dimensions):
-        """A law of a class that yields at about a limit, given as text and in SI.
-
-        What these laws draw of their own leaves the other draws of a seed as they are.
-        """
+        """A law of a class that yields at a limit; its own draws leave the others as they are."""
         hardening = self._hardening(limit, stiffness, dimensions)
         of, say, some = dimensions[0], self._say.number, self._others.uniform
         strain = size / stiffness
@@ -194,13 +185,7 @@ class Laws(Draws):
     # -- connectors ----------------------------------------------------------------------------
 
     def _laws(self, stiffness, way, force, dimensions, joint=None):
-        """Laws that connectors may have, by name.
-
-        Args:
-            stiffness, way, force: Their sizes in SI.
-            dimensions: Of stiffness, motion, force and viscosity.
-            joint: One that presses.
-        """
+        """Laws of connectors by name; dimensions of stiffness, motion, force and viscosity."""
         say, (of_k, of_e, of_f, of_c) = self._say, dimensions
         k, f = stiffness * self._size(-1.5, 1), force * self._size(-1.5, 0)
         c = stiffness * self._T * self._size(-2, 0)

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random machines of everything that a scene may have, each a script that anybody can run.
 
-`script(seed)` writes Python that makes `scene`, `scheme` and `dt`.  All numbers are plain, so that
-a seed that fails can be printed, and cut down by hand.  Sizes are drawn as parts of what the first
-beam makes natural (its length, EI/L², its period) and these over many decades; kinds of laws,
-joints and schemes are drawn from short lists, for each kind compiles forms of its own.
+Sizes are drawn over many decades, as parts of the length of the first beam, EI/L² and its period;
+kinds of laws, joints and schemes from short lists, for each compiles forms of its own.
 """
 
 import math
@@ -26,11 +24,7 @@ def script(seed):
 
 
 class _Writer(Draws):
-    """Draws a machine and writes it down.
-
-    Attributes:
-        lines: The script so far.
-    """
+    """Draws a machine and writes it down."""
 
     def __init__(self, seed):
         self._random = np.random.default_rng(seed)
@@ -337,10 +331,7 @@ def _number(x):
 
 
 def round_off(solution):
-    """Energy that the last digits of strains make, and its change by the strains that there are; J.
-
-    A strain is a difference of positions, which have digits of the size of the scene, over a cell.
-    """
+    """Energy that the last digits of strains make, of positions over a cell; J."""
     scene = solution.scene
     last = np.finfo(float).eps * scene.size
     least = 0.0

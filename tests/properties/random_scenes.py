@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random scenes of all public objects and schemes, each a script that anybody can run.
 
-`script(seed, statement)` writes Python that makes `scene`, `scheme`, `times`, `dt` and `mesh`.  All
-draws are those of the seed; the statement decides only how the scene is stated.  Sizes follow from
-the length L of the first beam, EI/L² and its period; they make motions that are large and yet
-regular.  Scattered limits depend on where beams begin and end, to the last digit: scenes that have
-them can be compared in another order only.
+Sizes follow from the length of the first beam, EI/L² and its period, so that motions are large and
+yet regular.  Scattered limits depend on the last digits of places: such scenes are reordered only.
 """
 
 import math
@@ -32,14 +29,7 @@ def script(seed, statement=AS_GIVEN):
 
 
 class _Anchor(NamedTuple):
-    """A place on a beam, a point of a body or of the ground.
-
-    Attributes:
-        text: As it is written.
-        point: Where it is in the first statement; m.
-        part: Of which beam, body or the ground it is.
-        is_end: Whether it is an end of a beam.
-    """
+    """A place as it is written, its point in the first statement, and the part that it is of."""
 
     text: str
     point: tuple
@@ -217,8 +207,8 @@ class _Writer(Laws):
             return tuple(sum(w * p[k] for w, p in zip(b, points, strict=True)) for k in (0, 1))
 
         lines = (
-            f"lambda s, p=({', '.join(self._ends(points, backwards))}): tuple((1 - s)**3 * p[0][k] + "
-            "3 * s * (1 - s)**2 * p[1][k] + 3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] "
+            f"lambda s, p=({', '.join(self._ends(points, backwards))}): tuple("
+            "(1 - s)**3 * p[0][k] + 3 * s * (1 - s)**2 * p[1][k] + 3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] "
             "for k in (0, 1))"
         )
         return axis, f".along({lines}"
@@ -360,7 +350,9 @@ class _Writer(Laws):
         angle, bend = self._some(-math.pi, math.pi), self._some(-0.5, 0.5) / self._L
         t = self._say.vector((math.cos(angle), math.sin(angle)))
         n = self._say.vector((-math.sin(angle), math.cos(angle)))
-        curve = f"lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple(p[k] + s * t[k] + "
+        curve = (
+            f"lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple(p[k] + s * t[k] + "
+        )
         curve += f"{self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1))"
         self._lists["joints"].append(f"ub.Guided({place}, {curve})")
 

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Statements of one scene that must give one motion: other axes, units, directions, orders.
 
-A scene is written as Python source by :mod:`random_scenes`.  All its numbers go through a
-:class:`Statement`, which knows what each is in the units and axes of the statement.  So any scene
-that fails can be printed and run by hand.
+All numbers of a scene go through a :class:`Statement` when it is written as Python source.
 """
 
 import math
@@ -104,13 +102,7 @@ def changed_statements(seed):
 
 
 class MotionGeometry:
-    """Writes numbers as text in the units and axes of a statement.
-
-    Args:
-        statement: How the scene is stated.
-        change: Units of the last place by which numbers change where the statement says so.
-        places_stay: Whether the digits of places do not change in any case.
-    """
+    """Writes numbers in the units and axes of a statement, digits of places perhaps as they are."""
 
     def __init__(self, statement, change=4, places_stay=False):
         self.statement, self._places_stay = statement, places_stay

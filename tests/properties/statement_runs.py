@@ -17,22 +17,12 @@ WITHIN = (0.37, 0.81)
 """Where section forces are compared: within cells, at vertices they jump."""
 
 MAGNIFIED = 1e3
-"""Differences of forces and energies over those of motions that are as good.
-
-Axial stiffnesses are up to 1e4 times those of bending, and strains some hundredths.
-"""
+"""Differences of forces and energies over those of motions: axial stiffnesses are up to 1e4 times
+those of bending, and strains some hundredths."""
 
 
 class Run:
-    """A statement of a scene, and its solution.
-
-    Attributes:
-        source: The script.
-        scene, solution: The scene, and what became of it; up to a failure if there is one.
-        failure: Why it ended early; None otherwise.
-        scattered: Whether limits depend on the last digits of places.
-        warnings: Messages of `ModelWarning`s of the run.
-    """
+    """A statement of a scene, its solution as far as it goes, its failure and its warnings."""
 
     def __init__(self, seed, statement=AS_GIVEN, source=script):
         self.statement = statement
@@ -84,8 +74,7 @@ class Run:
 def difference(one, other):
     """Largest difference at common times: of motions as parts of the scene or in rad; of the rest.
 
-    A rotation of many turns has the digits of its size.  Section forces count as parts of their
-    largest, energies as parts of the throughput, both over :data:`MAGNIFIED`.
+    Section forces count as parts of their largest, energies of the throughput, over `MAGNIFIED`.
     """
     (t, x), (s, y) = one.motion(), other.motion()
     if len(t) == len(s) and not (one.failure or other.failure):

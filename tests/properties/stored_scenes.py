@@ -39,12 +39,9 @@ STATIC = ub.Static, ub.EnergyMomentumStatic
 
 @dataclass
 class Draft:
-    """A scene while an effect writes into it, with its random numbers.
+    """A scene while an effect writes into it; number `changed` of the effect is another one.
 
     Attributes:
-        changed: Index of the number of the effect that is changed, or -1.
-        count: Number of numbers of the effect so far.
-        end: Time of the run; s.
         control: Control of a path, instead of a run in time.
         further: Records of the effect that the scene has in functions only.
     """
@@ -133,11 +130,7 @@ class Draft:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of the package: classes that have it, a function that writes scenes with it.
-
-    Attributes:
-        seeds: Other seeds of some scenes.
-    """
+    """An effect: its classes, a function that writes scenes, other seeds of some scenes."""
 
     name: str
     kinds: tuple[type, ...]

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Combinations of features agree with themselves: 24 of them, and 400 in `make verify`.
 
-``python3 tests/properties/test_combinations.py 1000 1500`` checks others and prints flags, with one
-number it prints the script of a combination.
+``python3 test_combinations.py 1000 1500`` checks others, with one number it prints the script.
 """
 
 import sys
@@ -145,10 +144,7 @@ def test_processes_agree(seed, shared_path):
 @pytest.mark.slow
 @pytest.mark.serial
 def test_few_combinations_are_refused_or_fail(tmp_path):
-    """In statics what breaks or flows has limit loads, beyond which there is no equilibrium.
-
-    Embedded hinges and fibres in one section, which some seeds draw, are refused.
-    """
+    """In statics there are limit loads; hinges and fibres in one section are refused."""
     found = [outcome_of(draw(seed), tmp_path, ["failed_step"]) for seed in range(NUMBER)]
     assert sum("run" in one for one in found) <= 0.02 * NUMBER
     assert sum(one.get("failed_step") == "passed" for one in found) <= 0.03 * NUMBER

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Beams that yield and break: cut in two, on several processes, in runs of two parts.
-
-Other units, axes, directions and orders are those of test_random_scenes.py.
-"""
+"""Beams that yield and break: cut in two, on several processes, in runs of two parts."""
 
 from itertools import chain, pairwise
 
@@ -30,10 +27,8 @@ class Frame:
     """A frame whose column and girder yield, flow or break; its strut is elastic.
 
     Args:
-        kind: One of KINDS.
         cut: Beams that are stated as two.
         viscous: Whether what flows also creeps.
-        strut_first: Whether the strut is the first beam of the scene, or the last one.
         size: Of the displacement that drives the frame; m.
     """
 
@@ -148,10 +143,7 @@ def test_a_beam_cut_in_two_is_the_same_beam(kind, scheme):
 @each_scheme
 @pytest.mark.parametrize("strut_first", [True, False])
 def test_processes_find_the_result_of_one(kind, scheme, strut_first):
-    """The number of processes: against each process alone.  On one rank: a run can be repeated.
-
-    On three ranks the first or the last one has the strut, and nothing that yields.
-    """
+    """On three ranks the first or the last one has the strut, and nothing that yields."""
 
     def run(comm):
         return Frame(kind, strut_first=strut_first).run(scheme, comm=comm)
@@ -165,10 +157,7 @@ def test_processes_find_the_result_of_one(kind, scheme, strut_first):
 @each_kind
 @each_scheme
 def test_a_run_in_two_parts_is_the_run(kind, scheme):
-    """Configuration, velocities and internal variables are all that a run needs.
-
-    The second part unloads, so that a first step that is cut does not lead elsewhere.
-    """
+    """The second part unloads, so that a first step that is cut does not lead elsewhere."""
     whole, part = (Frame(kind, size=0.12, viscous=False) for _ in range(2))
     whole.run(scheme, steps=100)
     first = ub.simulate(part.scene, scheme, t=(0, 0.7), dt=0.01, every=9)

@@ -90,10 +90,7 @@ def test_processes_find_the_result_of_one(seed, scheme):
 
 @each_draw
 def test_adaptive_steps_do_not_depend_on_the_statement(seed):
-    """The steps themselves, in other units, turned, on other numbers of processes.
-
-    Their lengths come from differences of accelerations, which have a few digits less.
-    """
+    """The steps themselves, by differences of accelerations, which have a few digits less."""
 
     def run(statement=AS_GIVEN, **more):
         return Built(draw(seed), statement).run(SCHEME, adaptive=ub.Adaptive(1e-4), **more)

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Derivatives of random combinations agree with differences of runs, or are refused with a reason.
 
-The parameter is a factor of a random number in the script.  The derivative must be within 1e-7 of
-its largest value, or within three times the digits of the differences, which are known from two of
-their changes: in stiff scenes round-off over a change of 1e-4 leaves 1e-6.
+The derivative by a factor of a random number must be within 1e-7 of its largest value, or within
+three times the digits of the differences, which are known from two of their changes.
 """
 
 import re

@@ -20,12 +20,8 @@ solution of KLU finds that the tangent is singular, within a careful search.
 ALL = range(500)
 
 CLOSED, MOSTLY, BY_TRAPEZES = 1e-5, 1e-9, 0.1
-"""Imbalance as a part of the energy that went through: of all machines, of nine in ten, and of
-`Static`, whose works follow the trapezoidal rule.
-
-The default tolerance meets forces to 1e-10 of all forces in the scene.  Machines have parts that
-are 1e9 times as stiff as others, and motors that strain them without work.
-"""
+"""Imbalance as a part of the energy that went through: of all machines, with parts that are 1e9
+times as stiff as others; of nine in ten; of `Static`, whose works follow the trapezoidal rule."""
 
 HANG = 300
 """Seconds after which a machine counts as one that hangs; those here need a tenth of it."""

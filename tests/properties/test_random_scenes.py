@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: MIT
 """200 random scenes, each stated in six ways: one result, constraints kept, a ledger that closes.
 
-`random_scenes.py` draws the scenes, `scene_statements.py` states them as given, turned, with beams
-that run the other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails
-prints the script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED`
-prints all of them with their differences.
+``python3 test_random_scenes.py SEED`` prints the scripts of a scene with their differences.
 """
 
 import math
@@ -46,10 +43,7 @@ CLEAR = "no equilibrium after t"
 
 
 def last_digits(run):
-    """What the last digits of its coordinates are to a scene; rad or a part of its size.
-
-    Other digits of the centre of an arc move it as a whole, and so do not show that they matter.
-    """
+    """Last digits of coordinates of a scene that is moved; rad or a part of its size."""
     far = math.hypot(*run.statement.shift) * run.statement.unit("m")
     return EPS * far / run.scene.size
 

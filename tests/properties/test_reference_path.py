@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Random scenes: results of the reference solver, and tangents against differences.
 
-The reference solver shares with a run the records of a scene, the numbering, the time schemes, and
-what states the mechanics.  The equation of a step, its solution, the return map and the ledger are
-written twice.  In scenes beyond its scope, results are those of version 0.1.0, which are stored.
+The reference solver shares records, numbering, time schemes and mechanics with a run.  In scenes
+beyond its scope, results are those of version 0.1.0, which are stored.
 """
 
 from functools import partial
@@ -22,11 +21,8 @@ import ufl_beam as ub
 
 SCENES = [20, 199, 240, 367]
 MACHINES = [0, 6, 10, 14, 17, 23, 27, 38, 65, 70, 72, 76, 82, 84, 85, 104, 111, 116, 117]
-"""Random scenes and machines up to 400 and 120 in the scope of the reference solver.
-
-Three machines are left out: Newton's method wanders in their steps, so that round-off decides where
-a step is cut.
-"""
+"""Random scenes and machines in the scope of the reference solver, without three in which Newton's
+method wanders, so that round-off decides where a step is cut."""
 
 MANY = [
     *(6, 11, 12, 13, 16, 18, 27, 29, 31, 33, 34, 44, 46, 51, 53, 56, 61, 67, 68, 81, 82, 91, 93),
@@ -109,9 +105,7 @@ def test_the_scenes_have_everything():
 def test_tangents(seed):
     """Off equilibrium, after a step, the tangent is the derivative of the forces by all unknowns.
 
-    The change of an unknown that suits most entries is too long where laws have corners or gaps are
-    short, and too short where parts are 1e6 times as stiff as others; each entry has the best of
-    four.
+    Changes are too long at corners of laws or too short in stiff parts: the best of four counts.
     """
     scene, scheme, (t0, _), dt, mesh = made(random_scenes.script(seed), random_scenes.STEPS)
     newton = ub.Newton(rtol=1e-12)

@@ -1,9 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenes whose statements once made two motions, as test_random_scenes.py has found.
-
-Each failed by far more than the tolerance here, which is a few hundred last digits of a metre times
-what a run makes of them.
-"""
+"""Scenes whose statements once made two motions, by far more than the tolerance here."""
 
 import math
 
@@ -211,9 +207,8 @@ def cracked_arc(seed, backwards=False, digits=None):
 def test_last_digits_do_not_choose(seed):
     """Attempts that fail leave no trace, and nothing is found by luck.
 
-    In each of these scenes last digits once decided whether a step was cut: where friction went on
-    as a failed attempt had left it, where relieved iterations met their limit just before they
-    arrived, and where they wandered until they fell on a solution.
+    Last digits once decided whether a step was cut: friction went on as a failed attempt left it,
+    relieved iterations met their limit just before they arrived, or wandered to a solution.
     """
     given = cracked_arc(seed)
     others = [cracked_arc(seed, backwards=True), *(cracked_arc(seed, digits=k) for k in range(3))]

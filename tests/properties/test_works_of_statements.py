@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The work of each statement is what it stores, loses and supplies, in each step and by itself.
-
-The balance of a scene would not show two errors that cancel.
-"""
+"""The work of each statement, by itself, is what it stores, loses and supplies in each step."""
 
 from mpi4py import MPI
 
@@ -23,10 +20,8 @@ POINTS = SpringBlock, InelasticCells
 
 STEPS = 12
 TOLERANCE = 1e-9
-"""Largest unexplained work, as a part of the energies in the ledger.
-
-Newton's tolerance of 1e-12 is relative to the forces of a scene, of which a statement has a part.
-"""
+"""Largest unexplained work, as a part of the energies in the ledger: Newton's tolerance of 1e-12 is
+relative to the forces of a scene, of which a statement has a part."""
 
 
 def works(block, trial):

@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions and classes of a user: works, laws, a scheme and a recorder, as docs/ show them.
-
-They are the same objects in all scenes, with other numbers each, so that each is compiled once.
-"""
+"""Functions and classes of a user, as in docs/; the same objects in all scenes, compiled once."""
 
 import sys
 from dataclasses import dataclass
