@@ -208,8 +208,8 @@ class _Writer(Laws):
 
         lines = (
             f"lambda s, p=({', '.join(self._ends(points, backwards))}): tuple("
-            "(1 - s)**3 * p[0][k] + 3 * s * (1 - s)**2 * p[1][k] + 3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] "
-            "for k in (0, 1))"
+            "(1 - s)**3 * p[0][k] + 3 * s * (1 - s)**2 * p[1][k] + "
+            "3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] for k in (0, 1))"
         )
         return axis, f".along({lines}"
 

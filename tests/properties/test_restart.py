@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A run that is stopped, by whatever, and run again is the run, to the last bit."""
 
+import contextlib
 import os
 import random
 import signal
@@ -143,32 +144,18 @@ def test_files_go_on(tmp_path):
     assert len(read_xdmf(parts / "run.xdmf").times) == 6
 
 
-# -- kill -9 ---------------------------------------------------------------------------------------
-
-
-def size_of(file):
-    """Bytes; none of one that is not there, as when a run tries whether it can be written."""
-    try:
-        return file.stat().st_size
-    except FileNotFoundError:
-        return 0
-
-
 def until_killed(folder, dice):
-    """Run the script and kill it some rows later, at any moment; whether it was still running."""
-    table = folder / "run.csv"
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    """Run the script and kill it a moment after it has gone on; whether it was still running."""
+
+    def size():
+        with contextlib.suppress(FileNotFoundError):  # not yet, or being replaced
+            return (folder / "run.csv").stat().st_size
+
+    environment, before = {**os.environ, "OMP_NUM_THREADS": "1"}, size()
     process = subprocess.Popen([sys.executable, str(SCRIPT), str(folder)], env=environment)
-    before, more = size_of(table), dice.randrange(200, 2500)  # bytes; a row has some 700
-    if dice.random() < 0.1:
-        time.sleep(dice.uniform(0, 1.5))  # while it begins
-    else:
-        while process.poll() is None and size_of(table) in (before, 0):
-            time.sleep(0.002)
-        begin = size_of(table)
-        while process.poll() is None and size_of(table) < begin + more:
-            time.sleep(0.0005)
-        time.sleep(dice.uniform(0, 0.02))
+    while process.poll() is None and size() in (before, None, 0):
+        time.sleep(0.002)
+    time.sleep(dice.uniform(0, 0.05))
     process.send_signal(signal.SIGKILL)
     return process.wait() == -signal.SIGKILL
 
