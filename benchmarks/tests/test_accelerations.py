@@ -75,9 +75,6 @@ def test_kept_tangents_are_switched_off(variant, keeps):
     assert (found > 0) == keeps
 
 
-# -- gains and lines -------------------------------------------------------------------------------
-
-
 def cases(factors):
     """Cases of all scenes; one round is ten times as slow, for all variants alike."""
     rest = {"rounds": 3, "steps": 1, "us_median": 1.0, "us_min": 1.0, "iterations": 2, "load": 0.5}

@@ -80,9 +80,6 @@ def test_results_have_a_line_for_each_record():
         assert json.loads(records.in_lines(value)) == value
 
 
-# -- idle effects ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", bench_idle.CASES)
 def test_the_effects_are_idle(name):
     (record,) = bench_idle.measure(name, rounds=1, steps={4: 20})

@@ -82,9 +82,6 @@ def jumps(case):
     assert not wrong, wrong
 
 
-# -- dynamics ----------------------------------------------------------------------------------
-
-
 @check
 def momentum(case):
     """In midpoint rules linear momentum grows by the impulses of loads, supports and the ground."""
@@ -234,8 +231,6 @@ def _require_linear_model(still, held, push, place, state, shapes):
         assert np.abs(other - full).max() <= 1e-6 * np.abs(full).max()
 
 
-# -- paths -------------------------------------------------------------------------------------
-
 IN_TIME = ("Controller", "state=", "Perzyna", "DuvautLions", "Dashpot", "KelvinVoigt")
 """What depends on time, or on rates, and is no part of a path."""
 
@@ -295,9 +290,6 @@ def buckles(case):
     strain = factor / names["b0"].section.EA + factor / names["b0"].section.GA
     assert first.kind == "bifurcation", (first, factor)
     assert abs(first.factor / factor - 1) < 4 * strain + 1e-6, (first.factor, factor)
-
-
-# -- pictures ----------------------------------------------------------------------------------
 
 
 @check

@@ -87,8 +87,6 @@ class Laws(Draws):
         limit, energy = map(self._say.number, (limit, energy), dimensions)
         return f"ub.{kind}(limit={limit}, fracture_energy={energy})"
 
-    # -- sections ------------------------------------------------------------------------------
-
     def _section(self, i):
         """Kind of a section, and hinges of its beam: laws by places."""
         stiff, heavy = self._size(-0.5, 0.5), self._size(-0.5, 0.5)
@@ -181,8 +179,6 @@ class Laws(Draws):
                 f"section{i}{name} = ub.Section.of_fibres([{', '.join(places)}], [{areas}], "
                 f"{stiff}, fibres=ub.Fibres({law}{crack}))"
             )
-
-    # -- connectors ----------------------------------------------------------------------------
 
     def _laws(self, stiffness, way, force, dimensions, joint=None):
         """Laws of connectors by name; dimensions of stiffness, motion, force and viscosity."""

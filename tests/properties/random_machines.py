@@ -46,15 +46,11 @@ class _Writer(Draws):
             self._damp()
         self._end()
 
-    # -- draws ---------------------------------------------------------------------------------
-
     def _vector(self, size):
         return "({:.6g}, {:.6g})".format(*self._polar(size))
 
     def _add(self, part, text):
         self._parts[part].append(text)
-
-    # -- sizes ---------------------------------------------------------------------------------
 
     def _scales(self):
         self._L = self._size(-2, 2)
@@ -76,8 +72,6 @@ class _Writer(Draws):
         if not self._static:
             kinds += ["lambda t: 1.0", f"lambda t: float(t < {t / 3:.6g})"]
         return self._one(kinds)
-
-    # -- materials -----------------------------------------------------------------------------
 
     def _hardening(self, stiffness, limit):
         """A law of a resultant, a fibre or a spring; sizes of stiffness and force."""
@@ -145,8 +139,6 @@ class _Writer(Draws):
             more.append(f"hinge={self._softening(limit * self._size(-1, 1))}")
         return f"({', '.join(more)})"
 
-    # -- beams and bodies ----------------------------------------------------------------------
-
     def _beam(self, i):
         kind, limit = self._section(i)
         name = f"beam{i}"
@@ -206,8 +198,6 @@ class _Writer(Draws):
         if kind == "Revolute" and (self._static or (more and self._chance(0.7))):
             self._turn(a, b, name)
 
-    # -- connectors ----------------------------------------------------------------------------
-
     def _turn(self, a, b, joint):
         size = self._M * self._size(-2, 1)
         laws = [self._spring(self._M, size), f"ub.PrescribedMotion({self._swing(1.0)})"]
@@ -259,8 +249,6 @@ class _Writer(Draws):
         ω = self._some(1, 6) / (self._dt * STEPS)
         return f"lambda t: {size * self._size(-3, 0):.6g} * (1 - math.cos({ω:.6g} * t))"
 
-    # -- supports ------------------------------------------------------------------------------
-
     def _support(self):
         if self._free:
             if self._chance(0.7):
@@ -287,8 +275,6 @@ class _Writer(Draws):
             curve += "(p[0] + s * d[0], p[1] + s * d[1] + s**2 * d[0])"
             self._add("joints", f"ub.Guided({last}, {curve})")
 
-    # -- loads ---------------------------------------------------------------------------------
-
     def _load(self):
         size = self._F * self._size(-4, 0)
         place = self._one(self._anchors)
@@ -313,8 +299,6 @@ class _Writer(Draws):
             self._add("damping", f"ub.Rayleigh(mass={mass:.6g}, stiffness={stiffness:.6g})")
         else:
             self._add("damping", f"ub.KelvinVoigt({self._size(-4, 1) * self._T:.6g})")
-
-    # -- the end -------------------------------------------------------------------------------
 
     def _end(self):
         theta = "EnergyMomentumStatic()", "EnergyMomentumStatic(0.5)"

@@ -72,8 +72,6 @@ class _Writer(Laws):
         self._frame()
         self._mesh()
 
-    # -- sizes and schemes ---------------------------------------------------------------------
-
     def _scales(self):
         self._static = self._chance(0.25)
         self._L = self._size(-1, 1)
@@ -122,8 +120,6 @@ class _Writer(Laws):
         if not self._static:
             kinds += ["lambda t: 1.0", f"lambda t: 1.0 - math.cos({ω} * t)"]
         return self._one(kinds)
-
-    # -- beams and bodies ----------------------------------------------------------------------
 
     def _beam(self, parent):
         """A beam, joined to an anchor if there is one."""
@@ -240,8 +236,6 @@ class _Writer(Laws):
         if self._may_hold:
             self._anchors.append(at(tuple(np.add(middle, (self._L / 5, self._L / 7)))))
 
-    # -- joints --------------------------------------------------------------------------------
-
     def _kind_of_joint(self, parent):
         """Kind, and how far apart its places are."""
         kinds = ["Rigid", "Rigid", "Rigid", "Revolute"]
@@ -283,8 +277,6 @@ class _Writer(Laws):
         """Another order, where the statement wants one."""
         if self._statement.shuffled is not None:
             self._order.shuffle(records)
-
-    # -- supports ------------------------------------------------------------------------------
 
     def _root(self):
         """What holds the first beam at its start."""
@@ -356,8 +348,6 @@ class _Writer(Laws):
         curve += f"{self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1))"
         self._lists["joints"].append(f"ub.Guided({place}, {curve})")
 
-    # -- loads, masses, damping ----------------------------------------------------------------
-
     def _load(self):
         size, say = self._F * self._size(-1.3, 0), self._say
         place, beam = self._one(self._anchors), self._one(self._lists["beams"])
@@ -411,8 +401,6 @@ class _Writer(Laws):
         refine, degree = self._one([1, 1, 1, 2]), self._one([1, 1, 2, 3])
         lumped, degree = self._chance(0.2), degree if self._elastic else 1
         self._lines.append(f"mesh = ub.Mesh({refine}, degree={degree}, lumped={lumped})")
-
-    # -- the end -------------------------------------------------------------------------------
 
     def source(self):
         """The script."""

@@ -349,7 +349,7 @@ def laws_on_arms(d, name):
     if name in ("yielding_spring", "breaking_spring"):
         beam = driven(d, size=0.1)
     else:
-        beam = arm(d, grows=d.swing() if name == "stop" else None)
+        beam = arm(d, grows=d.wave(6.0, 9.0) if name == "stop" else None)
     match name:
         case "yielding_spring":
             numbers = {"isotropic": (5, 20), "kinematic": (5, 20)}
@@ -408,7 +408,7 @@ def deteriorating_hinges(d, name):
     if name == "pinching_hinge":
         kind, names = st.PinchingHinge, [*names, "reloading"]
         numbers = {"kappa_F": d.acts(0.3, 0.7), "kappa_D": d.acts(0.2, 0.7)}
-    beam = driven(d, size=0.04, grows=d.surge(), hold=False)
+    beam = driven(d, size=0.04, grows=d.wave(8.0, 11.0, power=3), hold=False)
     d.add("supports", ub.Pinned(beam.start))
     M, k = d.some(0.8, 1.5), d.acts(150, 250)
     plus, minus = backbone(d, M, k), None if d.static else backbone(d, M, k)

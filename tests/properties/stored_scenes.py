@@ -92,20 +92,10 @@ class Draft:
         self.parts.setdefault(kind, []).extend(records)
         return records[-1]
 
-    def wave(self):
+    def wave(self, low=3.0, high=6.0, power=1):
         """A function of time that begins with zero and changes its sign or its slope."""
-        ω = self.some(3.0, 6.0) / self.end
-        return lambda t: math.sin(ω * t)
-
-    def swing(self):
-        """A function of time that begins with zero and has as large values of both signs."""
-        ω = self.some(6.0, 9.0) / self.end
-        return lambda t: math.sin(ω * t)
-
-    def surge(self):
-        """A function of time of both signs that begins with zero and with zero slope."""
-        ω = self.some(8.0, 11.0) / self.end
-        return lambda t: math.sin(ω * t) ** 3
+        ω = self.some(low, high) / self.end
+        return lambda t: math.sin(ω * t) ** power
 
     def swell(self):
         """A function of time that begins with zero and with zero slope, and comes back."""

@@ -151,9 +151,6 @@ def test_processes_find_the_result_of_one(kind, scheme, strut_first):
     require_same_on_processes(run, SAME)
 
 
-# -- a run goes on ---------------------------------------------------------------------------------
-
-
 @each_kind
 @each_scheme
 def test_a_run_in_two_parts_is_the_run(kind, scheme):

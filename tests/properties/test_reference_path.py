@@ -90,9 +90,6 @@ def test_random_machines_have_stored_results(seed, as_by_reference):
     as_by_reference(run(case, reference=False), SAME)
 
 
-# -- tangents --------------------------------------------------------------------------------------
-
-
 def test_the_scenes_have_everything():
     """The seeds above leave out no name of the package that hundreds of scenes have."""
     many, all_of_them = (
@@ -142,9 +139,6 @@ def test_tangents(seed):
     simulation.close()
     # Differences have errors of part² and of 1e-16 / part, times 1e3 where scenes are stiff.
     assert (worst / np.abs(K).max(axis=1, keepdims=True)).max() < 1e-6
-
-
-# -- start and refusals ----------------------------------------------------------------------------
 
 
 def softening():

@@ -21,8 +21,6 @@ def moves(solution, *places):
     return np.array([solution.displacement(place) for place in places])
 
 
-# -- places ----------------------------------------------------------------------------------------
-
 PLAIN = {"EA": 1e4, "GA": 4e3, "EI": 10, "rhoA": 1}
 
 
@@ -85,9 +83,6 @@ def test_frames_turn_beams_joined_to_the_ground():
     assert np.abs(ends[0] - ends[1]).max() < SAME
 
 
-# -- axes and units --------------------------------------------------------------------------------
-
-
 def test_the_size_of_a_scene_does_not_depend_on_axes():
     """Neither do tolerances, and so steps that adapt."""
     sizes, times = [], []
@@ -148,9 +143,6 @@ def test_adaptive_steps_do_not_wait_for_what_has_no_inertia():
     supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
     scene = ub.Scene([beam], supports=supports, loads=[ub.LineLoad(beam, moment=80.0)])
     assert len(run(scene, t=(0, 0.1), dt=ub.Adaptive(1e-3)).times) < 1000
-
-
-# -- last digits and directions --------------------------------------------------------------------
 
 
 def cracked_arc(seed, backwards=False, digits=None):
