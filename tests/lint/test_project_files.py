@@ -92,3 +92,28 @@ def test_a_forge_runs_the_targets_of_make():
     alone = re.findall(r"(?:then |^)target ([a-z-]+)", run, re.MULTILINE)
     called = {*listed.split(), *alone}
     assert {"test", "test-mpi", "test-sid"} <= called <= TARGETS
+
+
+SCHEMES = [
+    "Static()", "EnergyMomentumStatic(0.7)", "EnergyMomentum()", "EnergyMomentum(alpha=0.05)",
+    "EnergyMomentumDecaying()", "EnergyMomentumPrinted()", "Newmark()", "GeneralizedAlpha()",
+]  # fmt: skip
+
+SCRIPT = """
+import ufl_beam as ub
+
+def compare(scene: ub.Scene) -> list[ub.Solution]:
+    return [
+        {runs}
+    ]
+"""
+
+
+def test_a_script_with_all_schemes_passes(tmp_path):
+    """Protocols must not ask for attributes that can be set: frozen schemes have none."""
+    api = pytest.importorskip("mypy.api")
+    runs = ",\n        ".join(f"ub.simulate(scene, ub.{s}, t=(0, 1), dt=0.1)" for s in SCHEMES)
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.format(runs=runs))
+    text, errors, status = api.run(["--config-file", str(ROOT / "pyproject.toml"), str(script)])
+    assert status == 0, text + errors
