@@ -36,6 +36,14 @@ class Draws:
     def _one(self, choices):
         return choices[self._integer(0, len(choices) - 1)]
 
+    def _draw_scales(self, L, slender, EI, rhoA):
+        """Sizes of the first beam, by limits of decimal logarithms: its length, EI/L², period."""
+        self._L, self._slender = self._size(*L), self._size(*slender)
+        self._EI, self._rhoA = self._size(*EI), self._size(*rhoA)
+        self._F, self._M = self._EI / self._L**2, self._EI / self._L
+        self._EA = self._EI * (self._slender / self._L) ** 2
+        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
+
     def _polar(self, size):
         """A vector of a size."""
         angle = self._some(-math.pi, math.pi)

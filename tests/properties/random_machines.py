@@ -31,7 +31,8 @@ class _Writer(Draws):
         self.lines = [f"# seed {seed}", *IMPORTS]
         self._static = self._chance(0.3)
         self._parts, self._anchors = {name: [] for name in PARTS}, []
-        self._scales()
+        self._draw_scales((-2, 2), (0.7, 3), (-2, 8), (-3, 3))
+        self._dt = self._T * self._size(-3, 0)
         self._free = not self._static and self._chance(0.2)
         for i in range(self._integer(1, 4)):
             self._beam(i)
@@ -51,15 +52,6 @@ class _Writer(Draws):
 
     def _add(self, part, text):
         self._parts[part].append(text)
-
-    def _scales(self):
-        self._L = self._size(-2, 2)
-        self._slender = self._size(0.7, 3)
-        self._EI, self._rhoA = self._size(-2, 8), self._size(-3, 3)
-        self._F, self._M = self._EI / self._L**2, self._EI / self._L
-        self._EA = self._EI * (self._slender / self._L) ** 2
-        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
-        self._dt = self._T * self._size(-3, 0)
 
     def _time(self):
         """A time function."""

@@ -54,7 +54,10 @@ class _Writer(Laws):
         self._statement, self._anchors = statement, []
         self._flips = np.random.default_rng(statement.backwards)
         self._order = np.random.default_rng(statement.shuffled)
-        self._scales()
+        self._static = self._chance(0.25)
+        self._draw_scales((-1, 1), (1, 2), (-1, 5), (-1, 1))
+        self._dt = self._T * self._size(-2, -0.7)
+        self._end = STEPS * self._dt
         self._scheme()
         self._elastic = self._chance(0.3) and not self._scattered
         self._beam(None)
@@ -71,17 +74,6 @@ class _Writer(Laws):
         self._damp()
         self._frame()
         self._mesh()
-
-    def _scales(self):
-        self._static = self._chance(0.25)
-        self._L = self._size(-1, 1)
-        self._slender = self._size(1, 2)
-        self._EI, self._rhoA = self._size(-1, 5), self._size(-1, 1)
-        self._F, self._M = self._EI / self._L**2, self._EI / self._L
-        self._EA = self._EI * (self._slender / self._L) ** 2
-        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
-        self._dt = self._T * self._size(-2, -0.7)
-        self._end = STEPS * self._dt
 
     def _scheme(self):
         a, b = self._some(0.01, 0.5), self._some(0, 0.5)
