@@ -286,13 +286,9 @@ def assert_agree(case, tolerance=SAME, **changes):
 
 def leaps(case, short):
     """Whether in statics a state leaps in a step but the first: as far as four short steps."""
-    return case.combination.static and farthest(short) > 4 / 16 * farthest(case.exact)
-
-
-def farthest(run):
-    """Largest motion in a step but the first."""
-    motions, _ = results(run.names, run.solution)["motions"]
-    return np.abs(np.diff(motions, axis=1)[:, 1:]).max()
+    motions = (results(run.names, run.solution)["motions"][0] for run in (short, case.exact))
+    farthest = [np.abs(np.diff(x, axis=1)[:, 1:]).max() for x in motions]
+    return case.combination.static and farthest[0] > 4 / 16 * farthest[1]
 
 
 def has_cut(*runs):

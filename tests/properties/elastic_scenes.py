@@ -123,15 +123,10 @@ class Built:
             along = self._vector((math.cos(direction), math.sin(direction)))
             more = {"along": along} if kind == "Roller" else {}
             self.supports.append(getattr(ub, kind)(self.place(place), **more))
-        loads = [
-            getattr(ub, kind)(
-                self.place(place),
-                force=self._vector(force, "N"),
-                moment=moment * unit("N m"),
-                amplitude=ub.ramp(duration * unit("s")),
-            )
-            for kind, place, force, moment, duration in draw.forces
-        ]
+        loads = []
+        for kind, place, force, moment, duration in draw.forces:
+            numbers = self._vector(force, "N"), moment * unit("N m"), ub.ramp(duration * unit("s"))
+            loads.append(getattr(ub, kind)(self.place(place), *numbers))
         for i, force in draw.lines:
             loads += [ub.LineLoad(x, force=self._vector(force, "N/m")) for x in self._beams[i]]
         if draw.gravity:

@@ -222,30 +222,23 @@ def compute(one):
         found, acts = numbers(*draft.run()), []
         for k in range(draft.count):
             changed = numbers(*one.draft(seed, k).run())
-            same = {name: values for name, values in found.items() if name in changed}
-            other = {name: changed[name] for name in same}
-            same = {n: v for n, v in same.items() if len(v) == len(other[n])}
-            acts.append(max(differences(same, {n: other[n] for n in same}).values()))
+            same = [n for n in found if n in changed and len(found[n]) == len(changed[n])]
+            pair = ({name: of[name] for name in same} for of in (found, changed))
+            acts.append(max(differences(*pair).values()))
         scenes.append({"acts": acts, "numbers": found})
     return scenes
 
 
-def in_lines(numbers):
-    """Text of numbers in a file, with each list in one line."""
-    rows = [
-        f'  "{key}": [{", ".join(f"{x:.13g}" for x in values)}]' for key, values in numbers.items()
-    ]
-    return "{\n" + ",\n".join(rows) + "}"
-
-
 def write(name, scenes):
     """Write a file with each list of numbers in one line."""
-    lines = []
+    texts = []
     for scene in scenes:
         acts = ", ".join(f"{x:.1e}" for x in scene["acts"])
-        lines.append(f'{{"acts": [{acts}],\n "numbers": {in_lines(scene["numbers"])}}}')
+        lists = {key: ", ".join(f"{x:.13g}" for x in of) for key, of in scene["numbers"].items()}
+        lines = ",\n".join(f'  "{key}": [{values}]' for key, values in lists.items())
+        texts.append(f'{{"acts": [{acts}],\n "numbers": {{\n{lines}}}}}')
     FOLDER.mkdir(exist_ok=True)
-    (FOLDER / f"{name}.json").write_text("[" + ",\n".join(lines) + "]\n", "utf-8")
+    (FOLDER / f"{name}.json").write_text("[" + ",\n".join(texts) + "]\n", "utf-8")
 
 
 def main(names):
@@ -254,15 +247,9 @@ def main(names):
 
     missing = [name for name in EFFECTS if not (FOLDER / f"{name}.json").exists()]
     for name in names or missing:
-        try:
-            scenes = compute(EFFECTS[name])
-        except Exception as error:
-            print(name, "FAILED", repr(error)[:400], flush=True)
-            continue
+        scenes = compute(EFFECTS[name])
         write(name, scenes)
-        print(
-            name, *(f"{min(scene['acts'], default=math.nan):.1e}" for scene in scenes), flush=True
-        )
+        print(name, *(min(scene["acts"], default=math.nan) for scene in scenes), flush=True)
 
 
 if __name__ == "__main__":
