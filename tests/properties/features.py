@@ -289,34 +289,34 @@ LAWS = {
     "connector_law": "Stiffening(<50 200>, <500 3000>)",
     "connector_law_with_history": "Relaxing(<50 200>, <0.02 0.1>, <0.1 2>)",
 }
+TO_TIP = "ub.Bushing(ub.ground(0.2, 0.7), TIP, {}, axis=(0.3, 1.0))"
 CLEARANCE = "ub.Clearance(<300 900>, gap=<0.002 0.01>"
+RIGID_PLASTIC = "ub.RigidPlastic(ub.ElastoPlastic(<1 4>, isotropic=<50 200>))"
 BUSHINGS = {
-    "cushion": "[[LAST.at(0.5)|b0.end]], Cushion(<50 200>, <0.02 0.1>, <0.1 2>)",
-    "clearance": f"TIP, {CLEARANCE})",
-    "rough_clearance": f"TIP, {CLEARANCE}, damping=1.0, friction=<0.1 0.5 .3g>, radius=0.02)",
-    "axial_bending_hinge": "TIP, st.AxialBendingHinge(<2 20>, <0.5 3>, <300 900>, 500.0, 100.0)",
+    "cushion": "Cushion(<50 200>, <0.02 0.1>, <0.1 2>)",
+    "clearance": f"{CLEARANCE})",
+    "rough_clearance": f"{CLEARANCE}, damping=1.0, friction=<0.1 0.5 .3g>, radius=0.02)",
+    "axial_bending_hinge": "st.AxialBendingHinge(<2 20>, <0.5 3>, <300 900>, 500.0, 100.0)",
 }
 
 
-def connectors_to_places(d, name):
-    x, y = d.tip
+def connectors(d, name):
+    """A connector, or a connector of a law between the ground and a place."""
+    law, whole, (x, y) = LAWS.get(name), None, d.tip
     match name:
         case "side_spring":
             law = "ub.Spring(<50 300>), axis=(0.0, 1.0)"
-            text = f"ub.Slide(ub.ground({x!r}, {y!r}), TIP, {law})"
+            whole = f"ub.Slide(ub.ground({x!r}, {y!r}), TIP, {law})"
         case "integral_controller":
-            text = "ub.Turn(ub.ground(0, 0), b0.end, ub.Controller(Integral(b0.end, <0.5 2 .3f>)))"
+            law = "ub.Controller(Integral(b0.end, <0.5 2 .3f>))"
+            whole = f"ub.Turn(ub.ground(0, 0), b0.end, {law})"
         case "rigid_plastic":
-            law = "ub.RigidPlastic(ub.ElastoPlastic(<1 4>, isotropic=<50 200>))"
-            text = f"ub.Slide(ub.ground(0.2, 0.7), LAST.at(0.5), {law}, axis=(0.3, 1.0))"
-        case _:
-            text = f"ub.Bushing(ub.ground(0.2, 0.7), {BUSHINGS[name]}, axis=(0.3, 1.0))"
-    d.connectors.append(d.text(text))
-
-
-def connectors(d, name):
-    """A connector of a law between the ground and a place."""
-    match name:
+            place = "ub.ground(0.2, 0.7), LAST.at(0.5)"
+            whole = f"ub.Slide({place}, {RIGID_PLASTIC}, axis=(0.3, 1.0))"
+        case "cushion":
+            whole = TO_TIP.replace("TIP", "[[LAST.at(0.5)|b0.end]]").format(BUSHINGS[name])
+        case "clearance" | "rough_clearance" | "axial_bending_hinge":
+            whole = TO_TIP.format(BUSHINGS[name])
         case "spring_yields":
             law = f"ub.Spring(200.0, law={bulk_law(d, d.some(0.5, 4), 200.0)})"
         case "own_law_of_breaking":
@@ -330,15 +330,15 @@ def connectors(d, name):
             law = f"Brake({rest:.4g}, {rest * d.some(0.5, 1):.4g}, <0.02 0.2>)"
         case "deteriorating":
             law = deteriorating(d)
-        case _:
-            law = LAWS[name]
-    law, (x, y) = d.text(law), d.tip
-    kind, place = d.one("SLT"), d.one([f"{d.last}.at(0.5)", "b0.end"])
-    d.connectors.append({
-        "T": f"ub.Turn(ub.ground(0, 0), {place}, {law})",
-        "S": f"ub.Stretch(ub.ground({x + 0.5:.3f}, {y + 0.8:.3f}), {place}, {law})",
-        "L": f"ub.Slide(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))",
-    }[kind])  # fmt: skip
+    if whole is None:
+        law, kind, place = d.text(law), d.one("SLT"), d.one(["LAST.at(0.5)", "b0.end"])
+        far = f"ub.ground({x + 0.5:.3f}, {y + 0.8:.3f})"
+        whole = {
+            "T": f"ub.Turn(ub.ground(0, 0), {place}, {law})",
+            "S": f"ub.Stretch({far}, {place}, {law})",
+            "L": f"ub.Slide(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))",
+        }[kind]
+    d.connectors.append(d.text(whole))
 
 
 def deteriorating(d):
@@ -470,20 +470,16 @@ FEATURES = [
         (at_the_root, ["root"], "pinned shaken"),
         (at_the_root, ["root", "tip", "free"], "free_flight"),
         (bodies, ["body"], "body"),
-        (connectors, [], "spring"),
-        (connectors_to_places, [], "side_spring"),
-        (connectors, [], "spring_yields spring_breaks own_law_of_breaking damper stop damped_stop"),
+        (connectors, [], "spring side_spring spring_yields spring_breaks own_law_of_breaking"),
+        (connectors, [], "damper stop damped_stop"),
         (connectors, ["has_friction"], "coulomb"),
         (joints, ["has_friction", "joint"], "rubbing_pin"),
         (joints, ["joint"], "motor"),
-        (connectors, [], "actuator controller"),
-        (connectors_to_places, [], "integral_controller"),
-        (connectors, [], "force_law force_law_with_history"),
-        (connectors, [], "connector_law connector_law_with_history"),
-        (connectors_to_places, [], "cushion clearance rough_clearance"),
+        (connectors, [], "actuator controller integral_controller force_law"),
+        (connectors, [], "force_law_with_history connector_law connector_law_with_history"),
+        (connectors, [], "cushion clearance rough_clearance"),
         (connectors, ["has_friction"], "brake"),
-        (connectors_to_places, [], "rigid_plastic axial_bending_hinge"),
-        (connectors, [], "deteriorating"),
+        (connectors, [], "rigid_plastic axial_bending_hinge deteriorating"),
         (loads, [], "follower moment line_load imposed_strain pressure moving_load gravity"),
         (loads, ["frame"], "rotating_frame"),
         (virtual_works, ["work"], "virtual_work"),
