@@ -37,6 +37,13 @@ def scene_call(parts):
     return [*lines, ")"]
 
 
+def made(source):
+    """The names that a script defines."""
+    names = {}
+    exec(source, names)
+    return names
+
+
 @dataclass(frozen=True)
 class Statement:
     """How a scene is stated.

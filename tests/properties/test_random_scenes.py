@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from constraint_gaps import largest_gap
 from random_scenes import SAMPLE, script
-from scene_statements import AS_GIVEN, EPS, changed_statements
+from scene_statements import AS_GIVEN, EPS, changed_statements, made
 
 import ufl_beam as ub
 
@@ -62,11 +62,10 @@ class Run:
     def __init__(self, seed, statement=AS_GIVEN, source=script):
         self.statement = statement
         self.source = source(seed, statement)
-        names = {}
         self.failure = None
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            exec(self.source, names)
+            names = made(self.source)
             self.scene = names["scene"]
             arguments = {"t": names["times"], "dt": names["dt"], "mesh": names["mesh"]}
             try:

@@ -14,6 +14,7 @@ import pytest
 import random_machines
 import random_scenes
 from helpers import raises
+from scene_statements import made
 from scenes import clamped
 from stored_scenes import differences, numbers
 
@@ -40,17 +41,16 @@ pytestmark = [
 ]
 
 
-def made(source, steps):
-    """Scene, scheme, times, length of equal steps and mesh that a script makes."""
-    names = {}
-    exec(source, names)
+def case(of, seed):
+    """Scene, scheme, times, length of equal steps and mesh of a random scene or machine."""
+    names, steps = made(of.script(seed)), of.STEPS
     times = names.get("times") or (0.0, steps * names["dt"])
     return names["scene"], names["scheme"], times, (times[1] - times[0]) / steps, names.get("mesh")
 
 
-def run(case, *, reference):
+def run(one, *, reference):
     """The solution of a scene, as far as it goes."""
-    scene, scheme, times, dt, mesh = case
+    scene, scheme, times, dt, mesh = one
     newton = ub.Newton(rtol=1e-12, reference=reference)
     try:
         return ub.simulate(scene, scheme, t=times, dt=dt, mesh=mesh, newton=newton)
@@ -58,36 +58,34 @@ def run(case, *, reference):
         return error.solution
 
 
-def require_same(case):
+def require_same(one):
     """All states have the motions, forces and energies of the reference solver."""
-    solutions = [run(case, reference=reference) for reference in (False, True)]
+    solutions = [run(one, reference=reference) for reference in (False, True)]
     assert len(solutions[0]) == len(solutions[1])
     rows = range(1, len(solutions[0]))
-    mine, others = (dict(sorted(numbers(case[0], x, rows).items())) for x in solutions)
+    mine, others = (dict(sorted(numbers(one[0], x, rows).items())) for x in solutions)
     found = differences(mine, others)
     assert max(found.values()) < SAME, {k: v for k, v in found.items() if not v < SAME}
 
 
 @pytest.mark.parametrize("seed", SCENES)
 def test_random_scenes_have_the_results_of_the_reference(seed):
-    require_same(made(random_scenes.script(seed), random_scenes.STEPS))
+    require_same(case(random_scenes, seed))
 
 
 @pytest.mark.parametrize("seed", MACHINES)
 def test_random_machines_have_the_results_of_the_reference(seed):
-    require_same(made(random_machines.script(seed), random_machines.STEPS))
+    require_same(case(random_machines, seed))
 
 
 @pytest.mark.parametrize("seed", MANY)
 def test_random_scenes_have_stored_results(seed, as_by_reference):
-    case = made(random_scenes.script(seed), random_scenes.STEPS)
-    as_by_reference(run(case, reference=False), SAME)
+    as_by_reference(run(case(random_scenes, seed), reference=False), SAME)
 
 
 @pytest.mark.parametrize("seed", [8, 11, 15, 28, 29, 31, 33, 34])
 def test_random_machines_have_stored_results(seed, as_by_reference):
-    case = made(random_machines.script(seed), random_machines.STEPS)
-    as_by_reference(run(case, reference=False), SAME)
+    as_by_reference(run(case(random_machines, seed), reference=False), SAME)
 
 
 def test_the_scenes_have_everything():
@@ -105,7 +103,7 @@ def test_tangents(seed):
 
     Changes are too long at corners of laws or too short in stiff parts: the best of four counts.
     """
-    scene, scheme, (t0, _), dt, mesh = made(random_scenes.script(seed), random_scenes.STEPS)
+    scene, scheme, (t0, _), dt, mesh = case(random_scenes, seed)
     newton = ub.Newton(rtol=1e-12)
     simulation = ub.Simulation(scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF)
     equation, supports, numbering = simulation.equation, simulation.supports, simulation.numbering

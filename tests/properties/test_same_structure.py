@@ -6,7 +6,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 from random_scenes import SAMPLE, script
-from scene_statements import AS_GIVEN, Statement
+from scene_statements import AS_GIVEN, Statement, made
 from scenes import rigid_chain
 
 import ufl_beam as ub
@@ -24,8 +24,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 
 def run(seed, statement=AS_GIVEN):
     """All bits of the solution of a random scene, as far as it goes."""
-    names = {}
-    exec(script(seed, statement), names)
+    names = made(script(seed, statement))
     arguments = {"t": names["times"], "dt": names["dt"], "mesh": names["mesh"]}
     try:
         solution = ub.simulate(names["scene"], names["scheme"], **arguments)
