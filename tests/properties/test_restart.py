@@ -107,11 +107,12 @@ def test_a_finished_run_is_there_at_once_and_a_later_end_goes_on(shared_path):
     """The rounding of the times of steps is another; all else is the run."""
     checkpoint = ub.Checkpoint(shared_path / "run.checkpoint", every=100)
 
-    def until(end, **more):
-        return ub.simulate(machine(), ub.EnergyMomentum(0.05), t=(0, end), dt=0.005, **more)
+    def until(end, steps=10**9, **more):
+        more |= {"t": (0, end), "dt": 0.005, "record": stop_after(steps)}
+        return ub.simulate(machine(), ub.EnergyMomentum(0.05), **more)
 
     short = until(0.1, checkpoint=checkpoint)
-    again = until(0.1, checkpoint=checkpoint, record=stop_after(1))  # a step would stop it
+    again = until(0.1, steps=1, checkpoint=checkpoint)  # a single step would stop it
     assert_same_numbers(arrays_of(again), arrays_of(short))
     assert again.q.tobytes() == short.q.tobytes()
     longer, whole = until(0.2, checkpoint=checkpoint), until(0.2)
