@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from features import FEATURES, PLAIN, Feature
-from scene_statements import PARTS, scene_call
+from scene_statements import PARTS, made, scene_call
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING
 
 STATICS = ("Static()", "EnergyMomentumStatic()", "Static()", "EnergyMomentumStatic(0.7)")
@@ -197,9 +197,7 @@ class Combination:
 
     def make(self, source=None):
         """The names that the script defines, each time new ones: some remember what they saw."""
-        names = {}
-        exec(compile(source or self.source, f"combination {self.seed}", "exec"), names)
-        return names
+        return made(source or self.source)
 
     @cached_property
     def elastic(self):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from balance_of_parts import Balance
-from combination_case import DIGITS, SAME, check, difference, only
+from combination_checks import DIGITS, SAME, check, difference, only
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-import combination_checks  # noqa: F401 - adds its checks
-import mechanics_checks  # noqa: F401
+import mechanics_checks  # noqa: F401 - adds its checks
 import pytest
-from combination_case import flags_of, outcome_of
+from combination_checks import flags_of, outcome_of
 from combinations import DYNAMICS, STATICS, Combination, draw
 from features import FEATURES
 from helpers import PUBLIC
