@@ -101,7 +101,7 @@ def arrays_of(solution):
     return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
 
 
-def run(folder, *, steps=60, every=2, record=()):
+def run(folder):
     """Go on, or begin; with files."""
     scene = machine()
     beam = scene.beams[0]
@@ -111,11 +111,8 @@ def run(folder, *, steps=60, every=2, record=()):
         ub.XDMF(folder / "run.xdmf", every=7),
         ub.VTKHDF(folder / "run.vtkhdf", every=5),
     ]
-    checkpoint = ub.Checkpoint(folder / "run.checkpoint", every=every)
-    return ub.simulate(
-        scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.005 * steps), dt=0.005, every=3,
-        record=[*files, *record], checkpoint=checkpoint,
-    )  # fmt: skip
+    more = {"record": files, "checkpoint": ub.Checkpoint(folder / "run.checkpoint", every=2)}
+    return ub.simulate(scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.3), dt=0.005, every=3, **more)
 
 
 if __name__ == "__main__":
