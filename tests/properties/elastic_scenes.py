@@ -7,6 +7,7 @@ in two; results at its places must then be the same, scaled and turned.
 
 import math
 from itertools import chain, pairwise
+from types import SimpleNamespace
 
 from mpi4py import MPI
 
@@ -31,25 +32,14 @@ SECTION = {
 """Limits and dimensions of the numbers of a section."""
 
 
-class Draw:
-    """The numbers of a scene, in SI; places are (beam, s).
-
-    Attributes:
-        beams: (start, end, section, cells) of each.
-        joints, supports: (kind, place, place), (kind, place, direction in rad).
-        forces: (kind, place, force, moment, duration of the ramp).
-        lines, masses: (beam, force), (place, mass, inertia).
-        throw: (linear, angular), or None: a rigid motion of the whole scene.
-    """
-
-    def __init__(self):
-        self.beams, self.joints, self.supports = [], [], []
-        self.forces, self.lines, self.masses = [], [], []
-        self.gravity = self.throw = None
-
-
 def draw(seed, *, free=False, fixed=False, dead=False):
-    """A random scene: free, clamped at its root for statics, without follower loads (`dead`)."""
+    """Numbers of a random scene, in SI; places are (beam, s).
+
+    Beams are (start, end, section, cells), joints (kind, place, place), supports (kind, place, angle
+    of the direction), forces (kind, place, force, moment, duration of the ramp), lines (beam, force),
+    masses (place, mass, inertia), a throw (linear, angular).  A scene may be free, clamped at its
+    root for statics (`fixed`), or without follower loads (`dead`).
+    """
     random = np.random.default_rng(seed)
 
     def some(low, high):
@@ -64,7 +54,8 @@ def draw(seed, *, free=False, fixed=False, dead=False):
     def place():
         return beam(), float(random.choice(NODES))
 
-    scene = Draw()
+    names = "beams", "joints", "supports", "forces", "lines", "masses"
+    scene = SimpleNamespace(gravity=None, throw=None, **{name: [] for name in names})
     for i in range(random.integers(1, 5)):
         if i == 0:
             start = pair(1)
