@@ -35,10 +35,10 @@ SECTION = {
 def draw(seed, *, free=False, fixed=False, dead=False):
     """Numbers of a random scene, in SI; places are (beam, s).
 
-    Beams are (start, end, section, cells), joints (kind, place, place), supports (kind, place, angle
-    of the direction), forces (kind, place, force, moment, duration of the ramp), lines (beam, force),
-    masses (place, mass, inertia), a throw (linear, angular).  A scene may be free, clamped at its
-    root for statics (`fixed`), or without follower loads (`dead`).
+    Beams are (start, end, section, cells), joints (kind, place, place), supports (kind, place,
+    direction in rad), forces (kind, place, force, moment, duration of the ramp), lines (beam,
+    force), masses (place, mass, inertia), a throw (linear, angular).  A scene may be free, clamped
+    at its root for statics (`fixed`), or without follower loads (`dead`).
     """
     random = np.random.default_rng(seed)
 
