@@ -24,18 +24,13 @@ COMM = MPI.COMM_WORLD
 
 @pytest.fixture(autouse=True)
 def _no_garbage():
-    """Collect garbage after each test, so that all processes free PETSc objects together.
-
-    What is left over is frozen: a collection takes 0.1 s if it looks at all that earlier tests and
-    modules have left.
-    """
+    """Collect garbage after each test, so that all processes free PETSc objects together."""
     yield
-    gc.collect()
-    gc.freeze()
+    pytest_collection_finish()
 
 
-def pytest_collection_finish(session):
-    """What exists before the first test stays; collections then look at what tests made only."""
+def pytest_collection_finish():
+    """Freeze the objects that exist: a collection takes 0.1 s if it looks at those of all tests."""
     gc.collect()
     gc.freeze()
 
@@ -72,8 +67,7 @@ def pytest_collection_modifyitems(config, items):
 REFERENCE = HERE / "data" / "reference.json"
 """Numbers in the middle and at the end of runs of the reference solver of version 0.1.0, by tests.
 
-It had the laws of connectors and materials, loads, schemes and the ledger in NumPy, apart from what
-the package computed at that time.  It is gone: a test whose scene changes needs other numbers, of a
+It had all effects in NumPy, and is gone: a test whose scene changes needs other numbers, of a
 closed form or of a calculation that does not use the package.
 """
 
@@ -89,10 +83,7 @@ def as_by_reference(request):
     stored = iter(json.loads(REFERENCE.read_text("utf-8"))[name])
 
     def require(run, tolerance=1e-9):
-        """Raise if a number differs by more than a part of the largest motion, force or energy.
-
-        Both solvers stop at 1e-12 of the forces; conditions of scenes magnify that.
-        """
+        """Raise if a number differs by more than a part of the largest motion, force or energy."""
         found, expected = numbers(run.scene, run, [len(run) // 2, -1]), next(stored)
         assert found.keys() == expected.keys()
         found = differences(found, {name: expected[name] for name in found})
@@ -117,11 +108,11 @@ def on_first_rank():
         outcome = None
         if COMM.rank == 0:
             try:
-                outcome = True, function()
+                outcome = "", function()
             except Exception as error:
-                outcome = False, repr(error)
-        good, value = COMM.bcast(outcome)
-        assert good, value
+                outcome = repr(error), None
+        failure, value = COMM.bcast(outcome)
+        assert not failure
         return value
 
     return call

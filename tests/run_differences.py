@@ -51,10 +51,7 @@ def relative_error(a, b):
 
 
 def errors(model, at, scheme, of=history, changes=CHANGES, enough=0.0, **options):
-    """Least relative error of the derivative of a quantity by each parameter, by its name.
-
-    After an error below ``enough`` the other changes of a parameter are left out.
-    """
+    """Least relative error of the derivative by each parameter; no further below ``enough``."""
     run = ub.differentiate(model, at, scheme, newton=TIGHT, progress=False, **options)
     found, least = run.of(of), dict.fromkeys(at, np.inf)
     for k, name in enumerate(at):

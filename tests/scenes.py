@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Catalogue of scenes for tests and benchmarks: each cheap, parametrised, and a plain `ub.Scene`.
+"""Scenes of tests and benchmarks; lengths in m, SI units, unless a source has none.
 
 The beam to look at is `scene.beams[0]`, the support `scene.supports[0]`.
-Sources are named where a scene is somebody's; lengths in m, SI units, unless a source has none.
 """
 
 import math
@@ -63,12 +62,7 @@ def cantilever(
     load=ub.PointLoad,
     loads=(),
 ):
-    """Beam along x, clamped at the origin, with `load(...)` at its end and any other `loads`.
-
-    Args:
-        load: `ub.PointLoad` or `ub.FollowerLoad`.
-        loads: Functions of the beam that give more loads, `lambda beam: ub.LineLoad(beam, ...)`.
-    """
+    """Beam along x, clamped, with `load(...)` at its end; `loads`: functions of the beam."""
     beam = ub.Beam((0, 0), (length, 0), section, cells=cells)
     at_end = [load(beam.end, force=force, moment=moment, amplitude=time)]
     return clamped(beam, loads=at_end + [further(beam) for further in loads])
@@ -114,11 +108,7 @@ def portal(*, cells=4, H=20e3, V=-40e3, time=GROWING, feet=ub.Clamped):
 
 
 def struck_portal(*, hinges=None):
-    """Steel portal under a blow of half a sine, within 20 ms, at its corner, the end of beam 0.
-
-    Args:
-        hinges: Those of the column that is struck, as of `ub.Beam`.
-    """
+    """Steel portal under a blow of 20 ms at its corner, the end of beam 0, which has the hinges."""
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
     left = ub.Beam((0, 0), (0, 3), section, cells=3, hinges=hinges or {})
     roof = ub.Beam((0, 3), (4, 3), section, cells=4)
@@ -140,12 +130,9 @@ def flying_beam(*, cells=10, time=lambda t: 1.0 * (t < 2.5), mass=1.0):
     )
 
 
-SPIN_UP = {"omega": 6.0, "duration": 15.0}
-
-
 def spin_up_angle(t):
     """Imposed angle of the spin-up manoeuvre; rad (Simo and Vu-Quoc 1986)."""
-    ω, T = SPIN_UP["omega"], SPIN_UP["duration"]
+    ω, T = 6.0, 15.0
     if t >= T:
         return ω * t - ω * T / 2
     turn = 2 * math.pi / T
@@ -168,9 +155,7 @@ SWING_PULSE = ub.Table([0, 0.128, 0.256], [0, 2, 0])
 def swing(*, cells=4, rigidity=1e4):
     """Beam of 0.72 m with a mass at mid-span, hung on two links; no gravity (Bauchau and Theron).
 
-    Args:
-        cells: Cells of the beam; even, since the mass is at mid-span.
-        rigidity: The links, massless beams of one cell, are so many times as stiff as the beam.
+    The beam has an even number of cells; links are `rigidity` times as stiff.
     """
     EA, GA, EI = 3.65e5, 1.17e5, 0.0304166667
     flexible = ub.Section(EA=EA, GA=GA, EI=EI, rhoA=0.0135, rhoI=1.125e-9)
@@ -184,17 +169,4 @@ def swing(*, cells=4, rigidity=1e4):
         supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
         loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), amplitude=SWING_PULSE)],
-    )
-
-
-def double_pendulum(*, cells=4, EI=100.0):
-    """Two beams of 1 m along x, hinged to the origin and to each other, falling from rest."""
-    section = ub.Section(EA=1e4 * EI, GA=1e4 * EI, EI=EI, rhoA=1.0, rhoI=1e-3)
-    upper = ub.Beam((0, 0), (1, 0), section, cells=cells, name="upper")
-    lower = ub.Beam((1, 0), (2, 0), section, cells=cells, name="lower")
-    return ub.Scene(
-        [upper, lower],
-        joints=[ub.Revolute(upper.end, lower.start)],
-        supports=[ub.Pinned(upper.start)],
-        loads=[ub.Gravity()],
     )

@@ -2,20 +2,24 @@
 """Readers of time series, as simple as the formats allow: XML and numbers, and VTK itself."""
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
 
 import numpy as np
 
 
-@dataclass
 class Series:
     """A time series: points and cells of its mesh, fields of each time by name."""
 
-    times: list
-    points: np.ndarray
-    cells: np.ndarray
-    at_points: list
-    in_cells: list
+    def __init__(self):
+        self.times, self.at_points, self.in_cells = [], [], []
+        self.points = self.cells = None
+
+    def add(self, time, mesh):
+        """Add a time with a mesh of VTK; the reader deletes its arrays with the next one."""
+        self.times.append(time)
+        self.points = np.array(mesh.points)
+        self.cells = np.array(mesh.cell_connectivity).reshape(-1, 2)
+        self.at_points.append({name: np.array(mesh.point_data[name]) for name in mesh.point_data})
+        self.in_cells.append({name: np.array(mesh.cell_data[name]) for name in mesh.cell_data})
 
     def of(self, name):
         """The values of a field at all times."""
@@ -29,7 +33,7 @@ class Series:
 
 def read_xdmf(path):
     """All steps of an XDMF file; the mesh must be that of the first in each of them."""
-    series = Series([], None, None, [], [])
+    series = Series()
 
     def numbers(item):
         assert item.attrib["Format"] == "XML"
@@ -70,18 +74,13 @@ def read_vtkhdf(path):
     reader = vtkmodules.vtkIOHDF.vtkHDFReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()
-    series = Series([], None, None, [], [])
+    series = Series()
     for n in range(reader.GetNumberOfSteps()):
         reader.SetStep(n)
         reader.Update()
-        # Where the next step is read, arrays of the one before are gone.
         mesh = pyvista.wrap(reader.GetOutput()).copy()
         assert set(mesh.celltypes) == {pyvista.CellType.LINE}
-        series.times.append(reader.GetTimeValue())
-        series.points = np.array(mesh.points)
-        series.cells = np.array(mesh.cell_connectivity).reshape(-1, 2)
-        series.at_points.append({name: np.array(mesh.point_data[name]) for name in mesh.point_data})
-        series.in_cells.append({name: np.array(mesh.cell_data[name]) for name in mesh.cell_data})
+        series.add(reader.GetTimeValue(), mesh)
     return series
 
 
@@ -89,7 +88,7 @@ def read_as_users_do(path):
     """All steps of a file by PyVista (``.hdf``) or meshio (``.xdmf``), opened in one line."""
     import pytest
 
-    series = Series([], None, None, [], [])
+    series = Series()
     if path.suffix == ".hdf":
         import pyvista
 
@@ -98,10 +97,7 @@ def read_as_users_do(path):
         for n in range(reader.reader.GetNumberOfSteps()):
             reader.reader.SetStep(n)
             mesh = reader.read()
-            series.times.append(reader.reader.GetTimeValue())
-            series.at_points.append({name: mesh.point_data[name] + 0 for name in mesh.point_data})
-            series.in_cells.append({name: mesh.cell_data[name] + 0 for name in mesh.cell_data})
-        series.points, series.cells = mesh.points, mesh.cell_connectivity.reshape(-1, 2)
+            series.add(reader.reader.GetTimeValue(), mesh)
         for name, values in (series.at_points[0] | series.in_cells[0]).items():
             assert (first[name] == values).all()  # the file opens at its first time
         return series

@@ -3,6 +3,7 @@
 
 import inspect
 import sys
+from collections import defaultdict
 from dataclasses import MISSING, fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -35,223 +36,127 @@ NAMES = {"name", "depth", "shape"}
 """Fields that are for messages, pictures and section tables."""
 
 
-INDEPENDENT = {
-    "unit/test_axial_bending_hinge.py": {
-        "axial_bending_hinge": "test_the_plastic_moment_depends_on_the_axial_force",
-    },
-    "unit/test_bushings.py": {
-        "bushing": "test_on_a_line_it_is_a_stop",
-        "clearance": "test_on_a_line_it_is_a_stop",
-        "rough_clearance": "test_a_turning_pin_climbs_to_the_friction_angle",
-    },
-    "unit/test_connector_laws.py": {
-        "stop": "test_a_damped_stop_takes_a_part_of_the_velocity",
-        "own_connector_law": "test_modes_about_a_state",
-        "own_connector_law_with_state": "test_a_maxwell_element_relaxes",
-    },
-    "unit/test_controllers.py": {
-        "controller": "test_a_sample_time_is_independent_of_the_step",
-    },
-    "unit/test_distributions.py": {
-        "normal": "test_samples_have_the_distribution",
-        "truncated_normal": "test_samples_have_the_distribution",
-        "lognormal": "test_samples_have_the_distribution",
-        "weibull": "test_scale_of_weibull",
-    },
-    "unit/test_fibre_laws.py": {
-        "menegotto_pinto": "test_menegotto_pinto_over_random_paths",
-        "kent_park": "test_concrete_over_random_paths",
-        "mander": "test_concrete_over_random_paths",
-    },
-    "unit/test_fibres.py": {
-        "fibres": "test_plastic_moment_of_a_rectangle",
-        "placed_fibres": "test_plastic_moment_of_few_fibres",
-    },
-    "unit/test_force_diagrams.py": {
-        "pinned": "test_simply_supported_beam",
-    },
-    "unit/test_force_laws.py": {
-        "force_law": "test_vibration_of_a_steep_law",
-        "force_law_with_state": "test_a_history_against_its_closed_form",
-    },
-    "unit/test_ground_motion.py": {
-        "ground_motion": "test_the_integrals_are_exact",
-    },
-    "unit/test_hinge_laws.py": {
-        "ibarra_krawinkler": "test_one_excursion_by_hand",
-        "pinching_hinge": "test_two_pinched_excursions_by_hand",
-    },
-    "unit/test_hysteresis_laws.py": {
-        "ramberg_osgood": "test_a_ramberg_osgood_law_follows_its_power",
-        "armstrong_frederick": "test_armstrong_frederick_hardens_exponentially",
-        "bouc_wen": "test_bouc_wen_against_integration",
-    },
-    "unit/test_impacts.py": {
-        "impact": "test_a_clutch_that_closes_loses_the_energy_of_the_relative_speed",
-    },
-    "unit/test_imposed_strains.py": {
-        "imposed_strain": "test_heat_bends_a_free_beam_and_loads_a_clamped_one",
-    },
-    "unit/test_initial_state.py": {
-        "point_mass": "test_velocity_gives_kinetic_energy_and_momentum",
-        "velocity": "test_velocity_about_a_point",
-    },
-    "unit/test_interaction_laws.py": {
-        "axial_bending": "test_a_column_under_axial_force",
-    },
-    "unit/test_joints.py": {
-        "revolute": "test_bodies_pinned_to_each_other_away_from_their_centres",
-    },
-    "unit/test_laws_that_hold.py": {
-        "own_connector_law_that_holds": "test_a_slow_pull_slips_by_twice_the_drop",
-    },
-    "unit/test_loads.py": {
-        "point_load": "test_a_reaction_balances_a_point_load",
-        "table": "test_table_is_linear_between_and_constant_outside",
-    },
-    "unit/test_material_laws.py": {
-        "duvaut_lions": "test_overstress_relaxes_exponentially",
-    },
-    "unit/test_names_and_free_lengths.py": {
-        "spring": "test_a_spring_pulls_a_mass_to_its_free_length",
-    },
-    "unit/test_settlements.py": {
-        "clamped": "test_a_clamp_settles",
-        "prescribed_displacement": "test_an_inclined_roller_settles",
-    },
-    "unit/test_softening_laws.py": {
-        "rigid_then_softening": "test_moment_is_the_traction",
-        "own_softening_in_cells": "test_moment_is_the_traction",
-        "own_softening_at_a_place": "test_moment_is_the_traction",
-    },
-    "unit/test_user_laws.py": {
-        "own_material_law": "test_curvature_of_ramberg_and_osgood",
-    },
-    "verification/test_actions.py": {
-        "pressure": "test_ring_under_pressure",
-        "moving_load": "test_moving_mass",
-    },
-    "verification/test_adaptive.py": {
-        "adaptive": "test_the_estimate_is_the_error_of_a_step",
-    },
-    "verification/test_bifurcations.py": {
-        "load_control": "test_a_ring_under_pressure",
-        "arc_length": "test_a_ring_under_pressure",
-    },
-    "verification/test_damping.py": {
-        "kelvin_voigt": "test_kelvin_voigt_in_statics_is_retarded",
-    },
-    "verification/test_degree.py": {
-        "section": "test_one_cell_does_not_lock",
-        "mesh_of_degree_2": "test_one_cell_does_not_lock",
-        "mesh_of_degree_3": "test_one_cell_does_not_lock",
-        "refined_mesh": "test_half_circle",
-        "lumped_mass": "test_lumped_mass_of_a_rod",
-    },
-    "verification/test_effects_in_closed_form.py": {
-        "axial_and_shear": "test_a_beam_that_yields_in_shear",
-        "energy_momentum": "test_midpoint_rules_with_weights",
-        "fourth_order": "test_phase_of_the_scheme_of_fourth_order",
-        "own_scheme": "test_midpoint_rules_with_weights",
-    },
-    "verification/test_frequencies.py": {
-        "rotating_frame": "test_foucaults_pendulum",
-        "rigid": "test_a_slender_portal_that_sways",
-        "prismatic": "test_mass_on_a_turning_rail",
-        "guided": "test_a_bead_in_a_bowl",
-        "spline": "test_a_bead_in_a_bowl",
-    },
-    "verification/test_friction.py": {
-        "coulomb": "test_amplitudes_fall_by_4R_k_each_period",
-        "coulomb_in_a_joint": "test_bearing",
-    },
-    "verification/test_hinge.py": {
-        "softening_in_cells": "test_tip_load",
-        "linear_softening_in_cells": "test_tip_load",
-    },
-    "verification/test_linkages.py": {
-        "link": "test_a_trammel_does_not_leap",
-    },
-    "verification/test_machines.py": {
-        "release": "test_release_of_the_shear_force",
-        "turn": "test_spring_at_large_turns",
-        "stretch": "test_frequency_of_a_spring",
-        "slide": "test_frequency_of_a_spring",
-        "prescribed_motion": "test_motor_bears_the_inertia",
-        "prescribed_force": "test_given_moment",
-        "yielding_spring": "test_loop_of_a_bilinear_spring",
-        "breaking_spring": "test_breaking_spring",
-        "damper": "test_damper",
-        "body": "test_free_fall",
-    },
-    "verification/test_mattiasson_1981.py": {
-        "static": "test_elastica",
-    },
-    "verification/test_paths.py": {
-        "displacement_control": "test_branch_to_the_elastica",
-        "dissipation_control": "test_hinge_snap_back",
-    },
-    "verification/test_plastic_hinges.py": {
-        "rigid_plastic": "test_a_block_that_slips",
-        "softening_at_a_place": "test_moment_of_a_hinge",
-        "linear_softening_at_a_place": "test_moment_of_a_hinge",
-        "hardening_at_a_place": "test_kinematic_hardening_remembers_its_direction",
-    },
-    "verification/test_rigid_links.py": {
-        "rigid_link": "test_moment_is_force_times_offset",
-    },
-    "verification/test_schemes.py": {
-        "energy_momentum_decaying": "test_amplification_of_a_mode",
-        "energy_momentum_printed": "test_printed_midpoint_drifts_in_energy_and_keeps_momenta",
-        "newmark": "test_amplification_of_a_mode",
-        "generalized_alpha": "test_amplification_of_a_mode",
-    },
-    "verification/test_static_loads.py": {
-        "follower_load": "test_follower_force_at_the_end",
-        "line_load": "test_line_load_on_a_cantilever",
-        "gravity": "test_gravity_on_a_cantilever",
-        "roller": "test_roller_at_an_angle",
-        "curved_axis": "test_quarter_circle",
-    },
-    "verification/test_table_1.py": {
-        "elasto_plastic": "test_rate_independent",
-        "perzyna": "test_viscous",
-        "energy_momentum_static": "test_exact_statics",
-    },
-    "verification/test_tangent_damping.py": {
-        "rayleigh": "test_a_yielding_oscillator_converges_with_first_order",
-    },
-    "unit/test_statements_of_users.py": {
-        "own_statement": "test_a_maxwell_element_relaxes",
-    },
-    "verification/test_wind_soil_magnets.py": {
-        "virtual_work": "test_a_current_in_a_field",
-        "potential": "test_beam_on_an_elastic_foundation",
-    },
-}  # fmt: skip
-"""Tests of effects by closed forms or calculations that do not use the package, by file."""
+INDEPENDENT = """
+unit/test_axial_bending_hinge.test_the_plastic_moment_depends_on_the_axial_force:
+    axial_bending_hinge
+unit/test_bushings.test_on_a_line_it_is_a_stop: bushing clearance
+unit/test_bushings.test_a_turning_pin_climbs_to_the_friction_angle: rough_clearance
+unit/test_connector_laws.test_a_damped_stop_takes_a_part_of_the_velocity: stop
+unit/test_connector_laws.test_modes_about_a_state: own_connector_law
+unit/test_connector_laws.test_a_maxwell_element_relaxes: own_connector_law_with_state
+unit/test_controllers.test_a_sample_time_is_independent_of_the_step: controller
+unit/test_distributions.test_samples_have_the_distribution: normal truncated_normal lognormal
+unit/test_distributions.test_scale_of_weibull: weibull
+unit/test_fibre_laws.test_menegotto_pinto_over_random_paths: menegotto_pinto
+unit/test_fibre_laws.test_concrete_over_random_paths: kent_park mander
+unit/test_fibres.test_plastic_moment_of_a_rectangle: fibres
+unit/test_fibres.test_plastic_moment_of_few_fibres: placed_fibres
+unit/test_force_diagrams.test_simply_supported_beam: pinned
+unit/test_force_laws.test_vibration_of_a_steep_law: force_law
+unit/test_force_laws.test_a_history_against_its_closed_form: force_law_with_state
+unit/test_ground_motion.test_the_integrals_are_exact: ground_motion
+unit/test_hinge_laws.test_one_excursion_by_hand: ibarra_krawinkler
+unit/test_hinge_laws.test_two_pinched_excursions_by_hand: pinching_hinge
+unit/test_hysteresis_laws.test_a_ramberg_osgood_law_follows_its_power: ramberg_osgood
+unit/test_hysteresis_laws.test_armstrong_frederick_hardens_exponentially: armstrong_frederick
+unit/test_hysteresis_laws.test_bouc_wen_against_integration: bouc_wen
+unit/test_impacts.test_a_clutch_that_closes_loses_the_energy_of_the_relative_speed: impact
+unit/test_imposed_strains.test_heat_bends_a_free_beam_and_loads_a_clamped_one: imposed_strain
+unit/test_initial_state.test_velocity_gives_kinetic_energy_and_momentum: point_mass
+unit/test_initial_state.test_velocity_about_a_point: velocity
+unit/test_interaction_laws.test_a_column_under_axial_force: axial_bending
+unit/test_joints.test_bodies_pinned_to_each_other_away_from_their_centres: revolute
+unit/test_laws_that_hold.test_a_slow_pull_slips_by_twice_the_drop: own_connector_law_that_holds
+unit/test_loads.test_a_reaction_balances_a_point_load: point_load
+unit/test_loads.test_table_is_linear_between_and_constant_outside: table
+unit/test_material_laws.test_overstress_relaxes_exponentially: duvaut_lions
+unit/test_names_and_free_lengths.test_a_spring_pulls_a_mass_to_its_free_length: spring
+unit/test_settlements.test_a_clamp_settles: clamped
+unit/test_settlements.test_an_inclined_roller_settles: prescribed_displacement
+unit/test_softening_laws.test_moment_is_the_traction: rigid_then_softening own_softening_in_cells
+    own_softening_at_a_place
+unit/test_user_laws.test_curvature_of_ramberg_and_osgood: own_material_law
+verification/test_actions.test_ring_under_pressure: pressure
+verification/test_actions.test_moving_mass: moving_load
+verification/test_adaptive.test_the_estimate_is_the_error_of_a_step: adaptive
+verification/test_bifurcations.test_a_ring_under_pressure: load_control arc_length
+verification/test_damping.test_kelvin_voigt_in_statics_is_retarded: kelvin_voigt
+verification/test_degree.test_one_cell_does_not_lock: section mesh_of_degree_2 mesh_of_degree_3
+verification/test_degree.test_half_circle: refined_mesh
+verification/test_degree.test_lumped_mass_of_a_rod: lumped_mass
+verification/test_effects_in_closed_form.test_a_beam_that_yields_in_shear: axial_and_shear
+verification/test_effects_in_closed_form.test_midpoint_rules_with_weights: energy_momentum
+    own_scheme
+verification/test_effects_in_closed_form.test_phase_of_the_scheme_of_fourth_order: fourth_order
+verification/test_euler_column.test_end_position_and_angle: static
+verification/test_frequencies.test_foucaults_pendulum: rotating_frame
+verification/test_frequencies.test_a_slender_portal_that_sways: rigid
+verification/test_frequencies.test_mass_on_a_turning_rail: prismatic
+verification/test_frequencies.test_a_bead_in_a_bowl: guided spline
+verification/test_friction.test_amplitudes_fall_by_4R_k_each_period: coulomb
+verification/test_friction.test_bearing: coulomb_in_a_joint
+verification/test_hinge.test_tip_load: softening_in_cells linear_softening_in_cells
+verification/test_linkages.test_a_trammel_does_not_leap: link
+verification/test_machines.test_release_of_the_shear_force: release
+verification/test_machines.test_spring_at_large_turns: turn
+verification/test_machines.test_frequency_of_a_spring: stretch slide
+verification/test_machines.test_motor_bears_the_inertia: prescribed_motion
+verification/test_machines.test_given_moment: prescribed_force
+verification/test_machines.test_loop_of_a_bilinear_spring: yielding_spring
+verification/test_machines.test_breaking_spring: breaking_spring
+verification/test_machines.test_damper: damper
+verification/test_machines.test_free_fall: body
+verification/test_paths.test_branch_to_the_elastica: displacement_control
+verification/test_paths.test_hinge_snap_back: dissipation_control
+verification/test_plastic_hinges.test_a_block_that_slips: rigid_plastic
+verification/test_plastic_hinges.test_moment_of_a_hinge: softening_at_a_place
+    linear_softening_at_a_place
+verification/test_plastic_hinges.test_kinematic_hardening_remembers_its_direction:
+    hardening_at_a_place
+verification/test_rigid_links.test_moment_is_force_times_offset: rigid_link
+verification/test_schemes.test_amplification_of_a_mode: energy_momentum_decaying newmark
+    generalized_alpha
+verification/test_schemes.test_printed_midpoint_drifts_in_energy_and_keeps_momenta:
+    energy_momentum_printed
+verification/test_static_loads.test_follower_force_at_the_end: follower_load
+verification/test_static_loads.test_line_load_on_a_cantilever: line_load
+verification/test_static_loads.test_gravity_on_a_cantilever: gravity
+verification/test_static_loads.test_small_reaction_of_the_roller: roller
+verification/test_static_loads.test_quarter_circle: curved_axis
+verification/test_table_1.test_rate_independent: elasto_plastic
+verification/test_table_1.test_viscous: perzyna
+verification/test_table_1.test_exact_statics: energy_momentum_static
+verification/test_tangent_damping.test_a_yielding_oscillator_converges_with_first_order: rayleigh
+unit/test_statements_of_users.test_a_maxwell_element_relaxes: own_statement
+verification/test_wind_soil_magnets.test_a_current_in_a_field: virtual_work
+verification/test_wind_soil_magnets.test_beam_on_an_elastic_foundation: potential
+"""
+"""Tests of effects by closed forms or calculations that do not use the package: test, effects."""
+
+TESTS_OF: dict[str, list[str]] = {}
+for word in INDEPENDENT.split():
+    if word.endswith(":"):
+        TESTS_OF[word[:-1]] = []
+    else:
+        [*TESTS_OF.values()][-1].append(word)
 
 WITHOUT: set[str] = set()
 """Effects without such a test; the set must not grow."""
 
+MODULES = (
+    "model.", "mechanics.", "simulation.step_lengths", "analysis.path_controls",
+    "structures.concrete_laws", "structures.steel_laws", "structures.hinge_laws",
+    "structures.hysteresis_laws", "structures.ground_motion",
+)  # fmt: skip
 
-FOLDERS = "model.", "mechanics.", "simulation.step_lengths", "analysis.path_controls"
-LAWS = "concrete_laws", "steel_laws", "hinge_laws", "hysteresis_laws", "ground_motion"
-MODULES = *FOLDERS, *(f"structures.{name}" for name in LAWS)
-
-
-def public_effects():
-    """Public classes of models, schemes, steps and path controls, by name."""
-    return {
-        name: kind
-        for name, kind in helpers.PUBLIC.items()
-        if inspect.isclass(kind)
-        and kind.__module__.startswith(tuple(f"ufl_beam.{module}" for module in MODULES))
-        and name not in OTHERS
-    }
-
-
-PUBLIC = public_effects()
+PUBLIC = {
+    name: kind
+    for name, kind in helpers.PUBLIC.items()
+    if inspect.isclass(kind)
+    and kind.__module__.removeprefix("ufl_beam.").startswith(MODULES)
+    and name not in OTHERS
+}
+"""Public classes of models, schemes, steps and path controls, by name."""
 
 
 def test_effects_of_the_unions_are_public():
@@ -259,28 +164,21 @@ def test_effects_of_the_unions_are_public():
     assert {*LOADS, *Damping.__args__, *Law.__args__} - {Guide} <= set(PUBLIC.values())
 
 
-def effect_of(record):
-    """The class of a record, of a user's class its public base, or None."""
-    bases = [kind for kind in type(record).__mro__ if kind in PUBLIC.values()]
-    return bases[0] if bases else None
-
-
 def records_in(value, seen=None):
     """All records in a value, also those of other records and of functions of time."""
     seen = {} if seen is None else seen
     if id(value) in seen:
         return seen
+    parts = ()
     if is_dataclass(value) and not isinstance(value, type):
         seen[id(value)] = value
-        for field in fields(value):
-            records_in(getattr(value, field.name), seen)
-    elif isinstance(value, (list, tuple)):
-        for one in value:
-            records_in(one, seen)
-    elif isinstance(value, dict):
-        records_in(list(value.values()), seen)
+        parts = [getattr(value, field.name) for field in fields(value)]
+    elif isinstance(value, (list, tuple, dict)):
+        parts = list(value.values()) if isinstance(value, dict) else value
     elif inspect.ismethod(value):
-        records_in(value.__self__, seen)
+        parts = [value.__self__]
+    for part in parts:
+        records_in(part, seen)
     return seen
 
 
@@ -294,18 +192,14 @@ def records_of(name):
 @pytest.mark.parametrize("name", PUBLIC)
 def test_each_effect_acts_in_three_scenes(name):
     """It is in the scene, and the results differ from those with another number of it."""
-    own = [one for one in EFFECTS.values() if PUBLIC[name] in one.kinds]
-    scenes = [
-        (one.name, seed)
-        for one in own
-        for seed, scene in enumerate(stored(one.name))
+    own = [one.name for one in EFFECTS.values() if PUBLIC[name] in one.kinds]
+    scenes = [(one, seed, scene) for one in own for seed, scene in enumerate(stored(one))]
+    acting = [
+        any(isinstance(record, PUBLIC[name]) for record in records_of(one)[seed])
+        for one, seed, scene in scenes
         if max(scene["acts"]) > ACTS
-        and any(
-            effect_of(record) is PUBLIC[name] or type(record).__mro__[1:].count(PUBLIC[name])
-            for record in records_of(one.name)[seed]
-        )
     ]
-    assert len(scenes) >= 3
+    assert sum(acting) >= 3
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -321,14 +215,11 @@ def test_each_number_of_an_effect_acts(name):
 @cache
 def values_of_fields():
     """Values of each field of each effect in all scenes, by class and name."""
-    values = {}
-    for name in EFFECTS:
-        for record in (one for scene in records_of(name) for one in scene):
-            for kind in type(record).__mro__:
-                if kind in PUBLIC.values():
-                    for field in fields(record):
-                        key = kind.__name__, field.name
-                        values.setdefault(key, []).append(getattr(record, field.name))
+    values = defaultdict(list)
+    for record in (one for name in EFFECTS for scene in records_of(name) for one in scene):
+        for kind in type(record).__mro__:
+            for field in fields(record) if kind in PUBLIC.values() else ():
+                values[kind.__name__, field.name].append(getattr(record, field.name))
     return values
 
 
@@ -337,9 +228,7 @@ def options():
     for name, kind in PUBLIC.items():
         for field in fields(kind) if is_dataclass(kind) else ():
             default = field.default if field.default_factory is MISSING else field.default_factory()
-            switch = any(
-                isinstance(x, bool) for x in values_of_fields().get((name, field.name), ())
-            )
+            switch = any(isinstance(x, bool) for x in values_of_fields()[name, field.name])
             if field.init and field.name not in NAMES and (switch or default is not MISSING):
                 yield name, field.name, default
 
@@ -347,27 +236,17 @@ def options():
 @pytest.mark.parametrize(("name", "option", "default"), options())
 def test_each_option_is_in_a_scene(name, option, default):
     """With another value than its default; of a switch without default both values."""
-    values = values_of_fields().get((name, option), [])
+    values = values_of_fields()[name, option]
     if default is MISSING:
         assert {True, False} <= set(values)
     else:
-        assert any(not _same(value, default) for value in values)
-
-
-def _same(value, default):
-    return type(value) is type(default) and value == default
+        assert any(type(x) is not type(default) or x != default for x in values)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_each_degree_is_in_three_scenes(degree):
-    meshes = [
-        record
-        for name in EFFECTS
-        for scene in records_of(name)
-        for record in scene
-        if isinstance(record, ub.Mesh) and record.degree == degree
-    ]
-    assert len(meshes) >= 3
+    records = [record for name in EFFECTS for scene in records_of(name) for record in scene]
+    assert sum(isinstance(x, ub.Mesh) and x.degree == degree for x in records) >= 3
 
 
 def test_files_belong_to_effects_and_are_small():
@@ -377,17 +256,18 @@ def test_files_belong_to_effects_and_are_small():
 
 
 def test_each_effect_has_an_independent_test():
-    named = [name for tests in INDEPENDENT.values() for name in tests]
+    named = [name for names in TESTS_OF.values() for name in names]
     assert sorted([*named, *WITHOUT]) == sorted(EFFECTS)
 
 
-@pytest.mark.parametrize("file", INDEPENDENT)
-def test_independent_tests_exist(file):
+@pytest.mark.parametrize("place", TESTS_OF)
+def test_independent_tests_exist(place):
     """They are in the file, which uses a class of the effect, maybe by a scene of `scenes.py`."""
-    text = (TESTS / file).read_text("utf-8")
+    file, _, test = place.partition(".")
+    text = (TESTS / f"{file}.py").read_text("utf-8")
     scenes = (TESTS / "scenes.py").read_text("utf-8") if "from scenes import" in text else ""
-    for name, test in INDEPENDENT[file].items():
-        assert f"def {test}(" in text
+    assert f"def {test}(" in text
+    for name in TESTS_OF[place]:
         records = [one for scene in records_of(name) for one in scene]
         own = {type(one) for one in records if isinstance(one, EFFECTS[name].kinds)}
         assert any(kind.__name__ in text + scenes for kind in own.union(EFFECTS[name].kinds))

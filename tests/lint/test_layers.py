@@ -5,6 +5,7 @@ import ast
 import re
 import sys
 from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -24,10 +25,7 @@ SUBPACKAGES = [
     *("", "model", "compiled", "mechanics", "discretization", "terms", "blocks"),
     *("solvers", "output", "reference", "simulation", "analysis", "plotting", "structures"),
 ]
-"""From the lowest to the highest; the first one is the package itself.
-
-A module imports from its own subpackage and from those before it.
-"""
+"""From the lowest to the highest; a module imports from its own and from those before it."""
 
 C_FILES = {
     "compiled": "assembly csr",
@@ -68,11 +66,25 @@ def subpackage(module):
     return module.rpartition(".")[0]
 
 
+def above(one, other):
+    """Whether the other subpackage is higher."""
+    return SUBPACKAGES.index(other) > SUBPACKAGES.index(one)
+
+
+@cache
+def nodes(module):
+    return list(ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))))
+
+
+def names_in(module):
+    return {node.id for node in nodes(module) if isinstance(node, ast.Name)}
+
+
 @cache
 def imports(module):
     """Names that a module imports anywhere, also for type checkers."""
     found = set()
-    for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))):
+    for node in nodes(module):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -104,11 +116,7 @@ def outside(module):
 @cache
 def reach(module):
     """The module, and all modules of the package that come with it."""
-    found, todo = set(), {module}
-    while todo:
-        found |= todo
-        todo = set().union(*(imported(m) for m in todo)) - found
-    return found
+    return {module}.union(*map(reach, imported(module)))
 
 
 @cache
@@ -128,9 +136,8 @@ def c_functions():
 @cache
 def used_in_c(module):
     """C functions that a module calls or passes to C by name, with repetitions."""
-    names = re.findall(
-        r"\blib\.(\w+)|\bloop\(\s*\"(\w+)\"", FILES[module].read_text(encoding="utf-8")
-    )
+    called = re.compile(r"\blib\.(\w+)|\bloop\(\s*\"(\w+)\"")
+    names = called.findall(FILES[module].read_text(encoding="utf-8"))
     return [name for pair in names for name in pair if name in c_functions()]
 
 
@@ -152,18 +159,29 @@ def test_modules_and_their_imports_are_found():
 
 @pytest.mark.parametrize("module", FILES)
 def test_modules_import_no_higher_subpackage(module):
-    """From subpackage to subpackage, with no exemption for imports of type checkers."""
-    known = imported(module)
+    """From subpackage to subpackage, with no exemption for imports of type checkers; also in C."""
+    known, of = imported(module), subpackage(module)
     assert known <= {*FILES}
-    above = SUBPACKAGES[SUBPACKAGES.index(subpackage(module)) + 1 :]
-    assert [other for other in known if subpackage(other) in above] == []
+    assert [other for other in known if above(of, subpackage(other))] == []
+    assert [x for x in used_in_c(module) if above(of, c_functions()[x][0])] == []
+
+
+@pytest.mark.parametrize("module", FILES)
+def test_packages_beside_this_one_have_their_places(module):
+    found, of = outside(module), subpackage(module)
+    if module != "dolfinx_compat":
+        assert "dolfinx" not in found or of == "reference"
+        assert "VERSION" not in names_in(module)
+    assert "petsc4py" not in found or {module, of} & PETSC
+    assert not found & {"matplotlib", "pyvista", "PIL"} or module.startswith(DRAWING)
+    if of == "model":  # also through other modules of the package
+        assert [x for x in reach(module) if outside(x) & FINITE_ELEMENTS] == []
 
 
 def test_each_c_file_belongs_to_a_subpackage():
-    tree = ast.parse(FILES["compiled.c_library"].read_text(encoding="utf-8"))
-    sources = next(
+    (sources,) = (
         ast.literal_eval(node.value)
-        for node in tree.body
+        for node in nodes("compiled.c_library")
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "SOURCES"
     )
     assert sorted(" ".join(C_FILES.values()).split()) == sorted(sources)
@@ -172,21 +190,11 @@ def test_each_c_file_belongs_to_a_subpackage():
 
 def test_c_functions_call_no_higher_subpackage():
     for function, (of, calls) in c_functions().items():
-        above = SUBPACKAGES[SUBPACKAGES.index(of) + 1 :]
-        assert [x for x in calls if c_functions()[x][0] in above] == [], function
-
-
-@pytest.mark.parametrize("module", FILES)
-def test_modules_use_c_functions_of_no_higher_subpackage(module):
-    above = SUBPACKAGES[SUBPACKAGES.index(subpackage(module)) + 1 :]
-    assert [x for x in used_in_c(module) if c_functions()[x][0] in above] == []
+        assert [x for x in calls if above(of, c_functions()[x][0])] == [], function
 
 
 def test_a_step_enters_each_subpackage_once():
-    """From one place of Python, a chain of calls of C enters each subpackage once.
-
-    Steps and Newton's method call terms and blocks by their addresses, see `loop`.
-    """
+    """From one place of Python, calls of C enter each subpackage once; see `loop` for addresses."""
     entries = [(x, subpackage(m)) for m in FILES for x in used_in_c(m) if x in STEPS]
     assert sorted(entries) == [(x, "simulation") for x in sorted(STEPS)]
     chains = ways("take_steps")
@@ -198,60 +206,22 @@ def test_a_step_enters_each_subpackage_once():
     assert [way for way in chains | below if len(way) > len({*way})] == []
 
 
-def test_imports_have_no_cycles():
-    for module in FILES:
-        assert module not in set().union(*(reach(m) for m in imported(module))), module
-
-
-def test_chains_of_imports_are_short():
+def test_imports_have_no_cycles_and_short_chains():
+    TopologicalSorter({module: imported(module) for module in FILES}).prepare()
     assert max(map(depth, FILES)) <= MOST_DEPTH
 
 
-@pytest.mark.parametrize("module", [m for m in FILES if m != "dolfinx_compat"])
-def test_only_dolfinx_compat_and_the_reference_solver_import_dolfinx(module):
-    assert "dolfinx" not in outside(module) or subpackage(module) == "reference"
-
-
-@pytest.mark.parametrize("module", [m for m in FILES if m != "dolfinx_compat"])
-def test_only_dolfinx_compat_asks_for_versions(module):
-    names = {
-        node.id
-        for node in ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8")))
-        if isinstance(node, ast.Name)
-    }
-    assert "VERSION" not in names
-
-
-@pytest.mark.parametrize("module", [m for m in FILES if subpackage(m) == "reference"])
-def test_the_reference_solver_imports_neither_terms_nor_solvers(module):
-    assert not {subpackage(one) for one in imported(module)} & {"terms", "solvers", "compiled"}
-
-
-def test_only_runs_import_the_reference_solver():
-    users = {m for m in FILES if any(subpackage(one) == "reference" for one in imported(m))}
-    assert {m for m in users if subpackage(m) != "reference"} == {"simulation.reference_run"}
+def test_the_reference_solver_stands_alone():
+    """It imports neither terms nor solvers, and only runs import it."""
+    inside = {m for m in FILES if subpackage(m) == "reference"}
+    for module in inside:
+        assert not {subpackage(one) for one in imported(module)} & {"terms", "solvers", "compiled"}
+    assert {m for m in {*FILES} - inside if imported(m) & inside} == {"simulation.reference_run"}
 
 
 def test_kinematics_imports_ufl_only():
     assert outside("mechanics.kinematics") - sys.stdlib_module_names == {"ufl"}
     assert imported("mechanics.kinematics") == set()
-
-
-@pytest.mark.parametrize("module", [m for m in FILES if subpackage(m) == "model"])
-def test_the_model_imports_no_finite_elements(module):
-    """Directly, or through other modules of the package."""
-    for one in reach(module):
-        assert not outside(one) & FINITE_ELEMENTS, one
-
-
-def test_few_subpackages_import_petsc():
-    for module in FILES:
-        assert "petsc4py" not in outside(module) or {module, subpackage(module)} & PETSC, module
-
-
-@pytest.mark.parametrize("module", [m for m in FILES if not m.startswith(DRAWING)])
-def test_only_plotting_imports_matplotlib_and_pyvista(module):
-    assert not outside(module) & {"matplotlib", "pyvista", "PIL"}
 
 
 SEAMS = {
@@ -270,7 +240,7 @@ def test_structures_use_public_names_and_few_others():
         node.module.removeprefix("ufl_beam.")
         for file in FILES
         if subpackage(file) == "structures" and file != "structures.pictures"
-        for node in ast.walk(ast.parse(FILES[file].read_text(encoding="utf-8")))
+        for node in nodes(file)
         if isinstance(node, ast.ImportFrom) and node.module.startswith("ufl_beam.")
         if {alias.name for alias in node.names} - public
     }

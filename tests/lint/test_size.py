@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Size of the package: lines of Python and C, which grow only with a reason.
+"""Size of the package: lines of Python and C; a commit that raises a limit states the reason.
 
-Effects move from the terms of the old core to statements in ``blocks/``.  A commit that moves an
-effect lowers the limit of the other subpackages.  A commit that raises a limit has the reason in
-its message.
+Effects move from the terms of the old core to ``blocks/``, which lowers the other limits.
 """
 
 from pathlib import Path
@@ -20,15 +18,15 @@ LIMITS = {
 }
 
 
-def is_block(path):
-    return path.parent.name == "blocks" or path.name in BLOCKS
-
-
 @pytest.mark.parametrize("of_blocks", [True, False])
 @pytest.mark.parametrize("language", ["Python", "C"])
 def test_lines(language, of_blocks):
     suffixes = {".py"} if language == "Python" else {".c", ".h"}
-    files = [x for x in PACKAGE.rglob("*") if x.suffix in suffixes and is_block(x) == of_blocks]
-    lines = sum(len(path.read_text("utf-8").splitlines()) for path in files)
+    lines = sum(
+        len(path.read_text("utf-8").splitlines())
+        for path in PACKAGE.rglob("*")
+        if path.suffix in suffixes
+        and (path.parent.name == "blocks" or path.name in BLOCKS) == of_blocks
+    )
     limit = LIMITS[f"{language} {'of' if of_blocks else 'beside'} blocks"]
     assert 0 < lines <= limit, "see the docstring of this file"

@@ -1,28 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""Combinations of 2 to 5 features in small models, each a script that anybody can run.
+"""Combinations of 2 to 5 features in small models, each a script that anybody can run."""
 
-`draw(seed)` draws a model of one to three beams and its features from those of :mod:`features`.
-As a script: ``python3 combinations.py --from 0 --number 2000`` runs all checks of
-:mod:`combination_table` on each and prints how often each applied, passed and flagged;
-``--show SEED`` prints the script of one.
-"""
-
-import argparse
 import math
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
-import features_of_forces  # noqa: F401 - adds its features
 import numpy as np
 from features import FEATURES, PLAIN, Feature
+from scene_statements import PARTS, made, scene_call
 from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING
 
 STATICS = ("Static()", "EnergyMomentumStatic()", "Static()", "EnergyMomentumStatic(0.7)")
 DYNAMICS = (
     "EnergyMomentum()", "EnergyMomentum(0.05, 0.1)", "EnergyMomentumDecaying()",
-    "EnergyMomentumPrinted()", "Newmark()",
-    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "EnergyMomentum(order=4)",
+    "EnergyMomentumPrinted()", "Newmark()", "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)",
+    "Weighted(0.55)", "EnergyMomentum(order=4)",
 )  # fmt: skip
 SCHEMES = (*STATICS, *DYNAMICS)
 
@@ -30,8 +24,7 @@ EXACT = ("ub.EnergyMomentumStatic", "ub.EnergyMomentum(", "ub.EnergyMomentumDeca
 
 HOLDING = (
     "Link", "Prismatic", "multipliers=", "Guided", "PrescribedMotion", "Release", "Coulomb",
-    "Brake",
-    "RigidPlastic", "hinges=", "PrescribedDisplacement", "Roller", "Body",
+    "Brake", "RigidPlastic", "hinges=", "PrescribedDisplacement", "Roller", "Body",
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
 
@@ -50,6 +43,9 @@ COLUMN = (
 )  # fmt: skip
 """Features that leave a straight column straight under a load along it; every 16th seed is one."""
 
+RANDOM = re.compile(r"<(\S+) (\S+?)(?: (\S+))?>|\[\[(.*?)\]\](?!\])|TIME")
+"""Random parts of texts: limits and format of a number, alternatives, a function of time."""
+
 STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 
 HEAD = """import math
@@ -61,18 +57,11 @@ from user_classes import *
 
 @dataclass
 class Draft:
-    """A model while features write into it.
-
-    Attributes:
-        beams: Numbers of each: ends a and b, cells, section, kind of axis, hinges.
-        last: Name of the beam whose end is the `tip`.
-        end: Time of the run; s.
-    """
+    """A model while features write into it; `last`: name of the beam whose end is the `tip`."""
 
     random: np.random.Generator
     static: bool
     column: bool = False
-    beams: list = field(default_factory=list)
     sections: dict = field(default_factory=dict)
     last: str = "b0"
     joint: str = "ub.Rigid({a}, {b})"
@@ -82,22 +71,30 @@ class Draft:
     newton: str = "ub.Newton()"
     gap: bool = False
     end: float = 0.15
-    lines: list = field(default_factory=list)
-    joints: list = field(default_factory=list)
-    supports: list = field(default_factory=list)
-    loads: list = field(default_factory=list)
-    masses: list = field(default_factory=list)
-    initial: list = field(default_factory=list)
-    damping: list = field(default_factory=list)
-    bodies: list = field(default_factory=list)
-    connectors: list = field(default_factory=list)
-    works: list = field(default_factory=list)
+
+    def __post_init__(self):
+        for name in ("lines", "works", *PARTS):
+            setattr(self, name, [])
 
     def some(self, low, high):
         return float(self.random.uniform(low, high))
 
     def one(self, choices):
         return choices[int(self.random.integers(len(choices)))]
+
+    def text(self, row):
+        """A text with its random parts drawn."""
+        return RANDOM.sub(self._draw, row.replace("TIP", "LAST.end").replace("LAST", self.last))
+
+    def one_text(self, *rows):
+        """One of some texts; parts of the others are drawn, too."""
+        return self.one([self.text(row) for row in rows])
+
+    def _draw(self, part):
+        low, high, digits, choices = part.groups()
+        if choices is not None:
+            return self.one(choices.split("|"))
+        return format(self.some(float(low), float(high)), digits or ".4g") if low else self.time()
 
     def time(self):
         """A function of time, at most about one large."""
@@ -107,9 +104,7 @@ class Draft:
             f"ub.Table([0.0, {t / 3:.4g}, {t:.4g}], [0.0, {self.some(-1, 1):.3f}, 1.0])",
             f"lambda t: math.sin({self.some(2, 6) / t:.4g} * t)",
         ]
-        if not self.static:
-            kinds.append("lambda t: 1.0")
-        return self.one(kinds)
+        return self.one(kinds if self.static else [*kinds, "lambda t: 1.0"])
 
     @property
     def tip(self):
@@ -126,60 +121,46 @@ class Draft:
             x, y = self.beams[-1]["b"]
             self.beam((x, y), (x + 0.8, y - 0.5), 2)
 
-    def section(self, i, text):
-        self.sections[i] = text
-
-    def yields(self, i, law):
-        self.sections[i] = f"ub.Section({PLAIN}, {law})"
-
-    # -- the script ----------------------------------------------------------------------------
-
     def _beams(self):
         for i, beam in enumerate(self.beams):
             a, b = beam["a"], beam["b"]
             if i == 1 and self.gap:
                 a = (a[0] + 0.1, a[1] + 0.05)
+            more = f", hinges={beam['hinges']}" if beam["hinges"] else ""
             yield f"section{i} = {self.sections.get(i, f'ub.Section({PLAIN})')}"
-            yield f"b{i} = ub.Beam{_axis(beam['kind'], a, b)}, section{i}, " + (
-                f"cells={beam['cells']}, name='b{i}'"
-                + (f", hinges={beam['hinges']})" if beam["hinges"] else ")")
+            yield (
+                f"b{i} = ub.Beam{_axis(beam['kind'], a, b)}, section{i}, cells={beam['cells']}, "
+                f"name='b{i}'{more})"
             )
 
     def source(self, scheme, title):
         """The script."""
         lines = [f"# {title}", HEAD, *self._beams(), *self.bodies, *self.lines]
-        joints = list(self.joints)
-        if len(self.beams) > 1:
+        beams, joints = [f"b{i}" for i in range(len(self.beams))], list(self.joints)
+        bodies, supports = ["body"] * len(self.bodies), list(self.supports)
+        if len(beams) > 1:
             lines.append(f"joint = {self.joint.format(a='b0.end', b='b1.start')}")
             joints.append("joint")
-            joints += [f"ub.Rigid(b{i}.end, b{i + 1}.start)" for i in range(1, len(self.beams) - 1)]
-        supports = list(self.supports)
+            joints += [f"ub.Rigid({a}.end, {b}.start)" for a, b in pairwise(beams[1:])]
         if self.root is not None:
             rest = {"u": "v=0, psi=0", "v": "u=0, psi=0", "psi": "u=0, v=0"}
             moves = re.search(r"\}, (u|v|psi)=", self.root)
             text = self.root.format(place="b0.start", rest=rest[moves[1]] if moves else "")
             lines.append(f"root = {text}")
             supports.insert(0, "root")
-        moving = ", ".join(
-            [*(f"b{i}" for i in range(len(self.beams))), *["body"] * len(self.bodies)]
-        )
+        moving = ", ".join(beams + bodies)
         parts = {
-            "beams": [f"b{i}" for i in range(len(self.beams))], "joints": joints,
-            "supports": supports, "loads": self.loads, "masses": self.masses,
-            "initial": [text.format(moving=moving) for text in self.initial],
-            "damping": self.damping, "bodies": ["body"] * len(self.bodies),
-            "connectors": self.connectors, "works": self.works,
+            "beams": beams, "joints": joints, "supports": supports, "loads": self.loads,
+            "masses": self.masses, "initial": [x.format(moving=moving) for x in self.initial],
+            "damping": self.damping, "bodies": bodies, "connectors": self.connectors,
+            "works": self.works,
         }  # fmt: skip
-        lines.append("scene = ub.Scene(")
-        for name, records in parts.items():
-            if records:
-                lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
-        ours = "" if scheme.startswith("Weighted") else "ub."
-        text = "\n".join(lines)
+        text = "\n".join([*lines, *scene_call(parts)])
         if scheme == "Newmark()" and any(word in text for word in HOLDING):
             scheme = "Newmark(0.6, 0.36)"
-        return text + (
-            f"\n)\nscheme = {ours}{scheme}\nt, dt = (0.0, {self.end}), {self.step}\n"
+        ours = "" if scheme.startswith("Weighted") else "ub."
+        return (
+            f"{text}\nscheme = {ours}{scheme}\nt, dt = (0.0, {self.end}), {self.step}\n"
             f"mesh, newton = {self.mesh}, {self.newton}\n"
         )
 
@@ -203,11 +184,7 @@ def _axis(kind, a, b):
 
 @dataclass(frozen=True)
 class Combination:
-    """A drawn model.
-
-    Attributes:
-        source: Script that makes `scene`, `scheme`, `t`, `dt`, `mesh` and `newton`.
-    """
+    """A drawn model: a script that makes `scene`, `scheme`, `t`, `dt`, `mesh` and `newton`."""
 
     seed: int
     base: str
@@ -220,9 +197,7 @@ class Combination:
 
     def make(self, source=None):
         """The names that the script defines, each time new ones: some remember what they saw."""
-        names = {}
-        exec(compile(source or self.source, f"combination {self.seed}", "exec"), names)
-        return names
+        return made(source or self.source)
 
     @cached_property
     def elastic(self):
@@ -244,22 +219,22 @@ class Combination:
 
     @property
     def names(self):
-        """Public names that the script uses."""
+        """Public names that the script uses, also by its classes of a user."""
         found = set(re.findall(r"\b(?:ub|st)\.(?:extend\.|distributions\.)?(\w+)", self.source))
-        found |= {"ground"} if self.has("ub.ground") else set()
-        found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
-        found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
-        found |= {"ConnectorLaw"} if self.has(*CONNECTOR_LAWS) else set()
-        found |= {"Equations", "Statement"} if self.has("ub.Effect") else set()
-        own = {
-            "Coefficients",
-            "EnergyMomentumBase",
-            "MidpointDynamics",
-            "Scheme",
-            "DynamicScheme",
-            "Step",
-        }
-        return found | (own if self.has("Weighted") else set())
+        for words, used in USED.items():
+            found |= set(used.split()) if self.has(*words) else set()
+        return found
+
+
+USED = {
+    ("ub.ground",): "ground",
+    LAWS: "law_functions MaterialLaw",
+    SOFTENING: "law_functions SofteningLaw",
+    CONNECTOR_LAWS: "ConnectorLaw",
+    ("ub.Effect",): "Equations Statement",
+    ("Weighted",): "Coefficients EnergyMomentumBase MidpointDynamics Scheme DynamicScheme Step",
+}
+"""Public names that are used by others, which are words of scripts."""
 
 
 def draw(seed):
@@ -285,7 +260,7 @@ def draw(seed):
             chosen.append(one)
             taken |= set(one.slots)
     for one in chosen:
-        one.write(draft)
+        one.write(draft, one.name)
     steps = int(random.integers(8, 25))
     draft.step = draft.step or f"{draft.end / steps:.6g}"
     words = ", ".join(one.name for one in chosen)
@@ -301,7 +276,7 @@ def _allows(one, scheme, base):
     if scheme.startswith("EnergyMomentumDecaying") and one.name == "adaptive":
         return False
     static, at_end = scheme in STATICS, scheme.startswith(("Newmark", "Generalized"))
-    return one.statics if static else (one.dynamics and (one.at_end or not at_end))
+    return one.allows(static, at_end)
 
 
 def _build(d, base):
@@ -309,38 +284,17 @@ def _build(d, base):
     if base == "column":
         d.beam((0.0, 0.0), (1.0, 0.0), 6)
         d.loads.append("ub.PointLoad(b0.end, force=(-1.0, 0.0), amplitude=lambda t: t)")
-        d.section(0, f"ub.Section({STIFF})")
+        d.sections[0] = f"ub.Section({STIFF})"
         return
     if base == "portal":
-        d.beam((0.0, 0.0), (0.1, 1.0), 4)
-        d.beam((0.1, 1.0), (1.0, 1.1), 2)
-        d.beam((1.0, 1.1), (1.1, 0.0), 3)
+        corners = (0.0, 0.0), (0.1, 1.0), (1.0, 1.1), (1.1, 0.0)
+        for (a, b), cells in zip(pairwise(corners), (4, 2, 3), strict=True):
+            d.beam(a, b, cells)
         d.supports.append("ub.Pinned(b2.end)")
         d.last = "b1"
     else:
         d.beam((0.0, 0.0), (1.0, 0.2), d.one([2, 4]))
     if base == "chain":
         d.beam((1.0, 0.2), (1.8, -0.3), d.one([2, 3]))
-    x, y = d.some(-25, 25), d.some(-25, 25)
-    d.loads.append(f"ub.PointLoad({d.last}.end, force=({x:.3f}, {y:.3f}), amplitude={d.time()})")
-
-
-def main(arguments=None):
-    """Run the checks of many seeds, and print how often each applied, passed and flagged."""
-    import combination_table  # it imports this module
-
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--from", type=int, default=0, dest="first")
-    parser.add_argument("--number", type=int, default=100)
-    parser.add_argument("--checks", nargs="*", default=list(combination_table.CHECKS))
-    parser.add_argument("--show", type=int, help="print the script of this seed, and nothing else")
-    options = parser.parse_args(arguments)
-    if options.show is not None:
-        print(draw(options.show).source)
-        return
-    seeds = range(options.first, options.first + options.number)
-    print(combination_table.table_of(seeds, options.checks))
-
-
-if __name__ == "__main__":
-    main()
+    force = "force=(<-25 25 .3f>, <-25 25 .3f>)"
+    d.loads.append(d.text(f"ub.PointLoad(TIP, {force}, amplitude=TIME)"))

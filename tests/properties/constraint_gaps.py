@@ -6,29 +6,19 @@ import math
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from ufl_beam.model.bodies import GROUND, Body, BodyPoint
+from ufl_beam.model.bodies import Body
 from ufl_beam.model.connector_laws import Guide, PrescribedMotion
 from ufl_beam.model.functions import still
 from ufl_beam.model.joints import Joint
 
-COUPLES = {
-    # kind of a joint -> whether it keeps the point, and the rotation
-    "Rigid": (True, True),
-    "Revolute": (True, False),
-}
-
 
 def largest_gap(solution, size):
-    """Largest distance from what is promised, as a part of the size of the scene, or in rad.
-
-    Returns:
-        The distance, and whose promise it is.
-    """
+    """Largest distance from a promise over the size of the scene or in rad; whose promise it is."""
     gaps = [(0.0, "nobody")]
     for one in (*solution.scene.joints, *solution.scene.supports, *solution.scene.connectors):
         for moved, turned in _misses(solution, one):
-            gaps.append((float(np.abs(moved).max() / size), str(one)))
-            gaps.append((float(np.abs(turned).max()), str(one)))
+            gap = max(np.abs(moved).max() / size, np.abs(turned).max())
+            gaps.append((float(gap), str(one)))
     for body in solution.scene.bodies:
         gaps.append((_strain(solution, body, size), body.name))
     return max(gaps)
@@ -41,13 +31,12 @@ def _misses(solution, one):
         yield from _of_support(solution, one)
     elif isinstance(getattr(one, "law", None), PrescribedMotion):
         wanted = np.array([one.law.motion(t) for t in solution.times])
-        # Motions begin where the undeformed scene is.
-        motion = _relative(solution, one.motion, one.a, one.b, one.axis)
-        yield ((zero, motion - wanted) if one.is_rotation else (motion - wanted, zero))
-    elif kind in COUPLES:
-        point, rotation = COUPLES[kind]
-        for a, b in ((one.places[0], other) for other in one.places[1:]):
-            yield _apart(solution, a, b) * point, _turn(solution, a, b) * rotation
+        miss = _relative(solution, one.motion, one.a, one.b, one.axis) - wanted
+        yield (zero, miss) if one.is_rotation else (miss, zero)
+    elif kind in ("Rigid", "Revolute"):
+        a, *others = one.places
+        for b in others:
+            yield _apart(solution, a, b), _turn(solution, a, b) * (kind == "Rigid")
     elif kind == "Link":
         yield _relative(solution, "stretching", *one.places, None), zero
     elif kind == "RigidLink":
@@ -74,46 +63,37 @@ def _of_support(solution, support):
     u, v, ψ = moved.T
     in_axes = [cos * u + sin * v, cos * v - sin * u, ψ]
     for component, value in support.held.items():
-        if support.moving and value != still:
-            wanted = np.array([value(t) for t in solution.times])
-            wanted[0] = in_axes[component][0]  # nothing has moved yet
-        else:
-            wanted = np.zeros(len(solution.times))
-        miss = in_axes[component] - wanted
+        miss = in_axes[component]
+        if support.moving and value != still:  # at the start nothing has moved yet
+            miss = miss[1:] - [value(t) for t in solution.times[1:]]
         yield (np.zeros(1), miss) if component == 2 else (miss, np.zeros(1))
 
 
-def _rotation(solution, place):
-    return solution.displacement(place)[:, 2]
+def _between(solution, a, b):
+    """Growth of the difference of two displacements and rotations."""
+    return solution.displacement(b) - solution.displacement(a)
 
 
 def _turn(solution, a, b):
-    return _rotation(solution, b) - _rotation(solution, a)
+    return _between(solution, a, b)[:, 2]
 
 
 def _apart(solution, a, b):
-    """Distance grown since the beginning, of points that were one but for their last digits."""
-    between = solution.displacement(b)[:, :2] - solution.displacement(a)[:, :2]
-    return np.hypot(*between.T)
+    return np.hypot(*_between(solution, a, b)[:, :2].T)
 
 
 def _relative(solution, motion, a, b, axis):
     """A relative motion, from displacements; those of far points have digits of their own size."""
     start = np.subtract(b.point, a.point)
-    between = start + solution.displacement(b)[:, :2] - solution.displacement(a)[:, :2]
+    between = start + _between(solution, a, b)[:, :2]
     if motion == "turning":
         return _turn(solution, a, b)
     if motion == "stretching":
         return np.hypot(*between.T) - np.hypot(*start)
-    turn = np.zeros(len(between)) if _is_ground(a) else _rotation(solution, a)
-    x, y = axis
-    cos, sin = np.cos(turn), np.sin(turn)
+    turn = solution.displacement(a)[:, 2]
+    (x, y), cos, sin = axis, np.cos(turn), np.sin(turn)
     along = np.column_stack([cos * x - sin * y, sin * x + cos * y])
     return np.sum(along * between, axis=1) - np.dot(axis, start)
-
-
-def _is_ground(place):
-    return isinstance(place, BodyPoint) and place.body is GROUND
 
 
 def _from_curve(solution, holder):

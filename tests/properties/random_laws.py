@@ -8,6 +8,12 @@ STRAINS = {"N m2": "1/m", "N": "1", "Pa": "1", "N/m": "m", "N m": "1"}
 
 INVERSE = {"1/m": "m", "1": "1", "m": "1/m"}
 
+OF_LENGTHS = "N/m", "m", "N", "N s/m"
+"""Dimensions of stiffness, motion, force and viscosity."""
+
+IMPORTS = "import math", "import ufl_beam as ub", "import ufl_beam.structures as st", ""
+"""First lines of scripts."""
+
 CLASSES = ["ElastoPlastic", "ElastoPlastic", "RambergOsgood", "ArmstrongFrederick", "BoucWen"]
 
 
@@ -30,39 +36,42 @@ class Draws:
     def _one(self, choices):
         return choices[self._integer(0, len(choices) - 1)]
 
+    def _draw_scales(self, L, slender, EI, rhoA):
+        """Sizes of the first beam, by limits of decimal logarithms: its length, EI/L², period."""
+        self._L, self._slender = self._size(*L), self._size(*slender)
+        self._EI, self._rhoA = self._size(*EI), self._size(*rhoA)
+        self._F, self._M = self._EI / self._L**2, self._EI / self._L
+        self._EA = self._EI * (self._slender / self._L) ** 2
+        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
+
+    def _polar(self, size):
+        """A vector of a size."""
+        angle = self._some(-math.pi, math.pi)
+        return size * math.cos(angle), size * math.sin(angle)
+
 
 class Laws(Draws):
     """The part of the writer of random scenes that draws laws."""
 
     def _hardening(self, limit, stiffness, dimensions):
-        """A law that yields.
-
-        Args:
-            limit: Text.
-            stiffness: In SI.
-            dimensions: Those of the stiffness, and of the viscosity.
-        """
+        """A law that yields at a limit (text); dimensions of the stiffness and of the viscosity."""
         say, (of_stiffness, of_viscosity) = self._say, dimensions
         modulus, kinematic = (stiffness * self._size(-2, -0.5) for _ in range(2))
         time = self._end * self._size(-1, 1)
         kind = self._one(["", "isotropic", "kinematic", "both"])
         viscous = self._one(["", "", "Perzyna", "DuvautLions"])
         more = [f"yield_limit={limit}"]
-        if kind in ("isotropic", "both"):
-            more.append(f"isotropic={say.number(modulus, of_stiffness)}")
-        if kind in ("kinematic", "both"):
-            more.append(f"kinematic={say.number(kinematic, of_stiffness)}")
-        if viscous == "Perzyna":
-            more.append(f"viscosity=ub.Perzyna({say.number(time * stiffness, of_viscosity)})")
-        if viscous == "DuvautLions":
-            more.append(f"viscosity=ub.DuvautLions({say.number(time, 's')})")
+        for name, size in (("isotropic", modulus), ("kinematic", kinematic)):
+            if kind in (name, "both"):
+                more.append(f"{name}={say.number(size, of_stiffness)}")
+        if viscous:
+            perzyna = time * stiffness, of_viscosity
+            size = say.number(*(perzyna if viscous == "Perzyna" else (time, "s")))
+            more.append(f"viscosity=ub.{viscous}({size})")
         return f"ub.ElastoPlastic({', '.join(more)})"
 
     def _yielding(self, name, limit, size, stiffness, dimensions):
-        """A law of a class that yields at about a limit, given as text and in SI.
-
-        What these laws draw of their own leaves the other draws of a seed as they are.
-        """
+        """A law of a class that yields at a limit; its own draws leave the others as they are."""
         hardening = self._hardening(limit, stiffness, dimensions)
         of, say, some = dimensions[0], self._say.number, self._others.uniform
         strain = size / stiffness
@@ -85,8 +94,6 @@ class Laws(Draws):
         kind = self._one(["Softening", "LinearSoftening"])
         limit, energy = map(self._say.number, (limit, energy), dimensions)
         return f"ub.{kind}(limit={limit}, fracture_energy={energy})"
-
-    # -- sections ------------------------------------------------------------------------------
 
     def _section(self, i):
         """Kind of a section, and hinges of its beam: laws by places."""
@@ -120,21 +127,17 @@ class Laws(Draws):
             law = self._yielding(name, say.number(limit, "N m"), limit, EI, ("N m2", "N m2 s"))
             laws = [f"bending={law}"]
             force = limit / self._L * self._size(0, 1)
-            law = self._yielding(name, say.number(force, "N"), force, EA, ("N", "N s"))
-            laws += [f"axial={law}"] if self._chance(0.3) else []
-            law = self._yielding(name, say.number(force, "N"), force, EA, ("N", "N s"))
-            laws += [f"shear={law}"] if self._chance(0.3) else []
+            for of in ("axial", "shear"):
+                law = self._yielding(name, say.number(force, "N"), force, EA, ("N", "N s"))
+                laws += [f"{of}={law}"] if self._chance(0.3) else []
             if kind == "resultants" and self._others.random() < 0.2:
                 both = f"{say.number(force, 'N')}, {say.number(limit, 'N m')}"
                 laws = [f"interaction=st.AxialBending({both})"]
             more += laws
         if kind in ("hinge", "both"):
-            size = limit * self._size(0, 0.5)
-            laws = [
-                self._softening(size, size * self._size(-0.5, 1), ("N m", "J")) for _ in range(2)
-            ]
-            if self._chance(0.6):
-                more.append(f"hinge={laws[0]}")
+            size, of = limit * self._size(0, 0.5), ("N m", "J")
+            laws = [self._softening(size, size * self._size(-0.5, 1), of) for _ in range(2)]
+            more += [f"hinge={laws[0]}"] if self._chance(0.6) else []
             # Not at vertices, where the hinge is in the cell before it.
             hinges = self._one([{}, {0.0: laws[1]}, {0.43: laws[1]}, {1.0: laws[1]}])
         self._lines.append(f"section{i} = ub.Section({', '.join(more)})")
@@ -147,25 +150,18 @@ class Laws(Draws):
         h = say.number(h, "m")
         shape = self._one([
             f"ub.Section.rectangle({h}, {h}", f"ub.Section.circle({h}",
-            f"ub.Section.tube({h}, {wall}",
-            f"st.i_shape({h}, {h}, {wall}, {wall}",
+            f"ub.Section.tube({h}, {wall}", f"st.i_shape({h}, {h}, {wall}, {wall}",
         ])  # fmt: skip
-        self._lines.append(
-            f"section{i} = {shape}, E={say.number(E, 'Pa')}, nu=0.3, "
-            f"rho={say.number(rho, 'kg/m3')})"
-        )
+        stiff = f"E={say.number(E, 'Pa')}, nu=0.3, rho={say.number(rho, 'kg/m3')}"
+        self._lines.append(f"section{i} = {shape}, {stiff})")
 
     def _of_fibres(self, i, kind, EA, EI, rhoA, limit):
         """Layers of a shape, or fibres that are placed to one side."""
         say, h = self._say, math.sqrt(12 * EI / EA)
         E, strength = EA / h**2, 6 * limit / h**3
         mean, scatter = say.number(strength, "Pa"), say.number(strength / 4, "Pa")
-        drawn = self._one([
-            f"ub.distributions.Normal({mean}, {scatter}, seed={i})",
-            f"ub.distributions.Lognormal({mean}, {scatter}, seed={i})",
-            f"ub.distributions.TruncatedNormal({mean}, {scatter}, seed={i})",
-            f"ub.distributions.Weibull({mean}, 3.0, seed={i})",
-        ])  # fmt: skip
+        kinds = [f"{x}({mean}, {scatter}" for x in ("Normal", "Lognormal", "TruncatedNormal")]
+        drawn = f"ub.distributions.{self._one([*kinds, f'Weibull({mean}, 3.0'])}, seed={i})"
         limit = drawn if self._scattered else mean
         law = self._yielding(self._others.choice(CLASSES), limit, strength, E, ("Pa", "Pa s"))
         size = strength * self._size(0, 0.5)
@@ -177,35 +173,23 @@ class Laws(Draws):
         text = say.number(h, "m")
         if kind == "fibres":
             size = f"{text}, {text}" if shape == "rectangle" else text
-            self._lines.append(
-                f"section{i} = ub.Section.{shape}({size}, {stiff}, "
-                f"fibres=ub.Fibres({law}, number={number}{crack}))"
-            )
+            fibres = f"fibres=ub.Fibres({law}, number={number}{crack})"
+            self._lines.append(f"section{i} = ub.Section.{shape}({size}, {stiff}, {fibres})")
             return
         self._asymmetric = True
         y = [h * (k + self._some(-0.3, 0.3)) / number for k in range(number)]
         A = [h**2 / number * self._some(0.5, 1.5) for _ in range(number)]
         areas = ", ".join(say.number(a, "m2") for a in A)
         up = [say.number(x, "m") for x in y]
-        for name, places in (
-            ("", up),
-            ("_upside_down", [x[1:] if x[0] == "-" else f"-{x}" for x in up]),
-        ):
+        down = [x[1:] if x[0] == "-" else f"-{x}" for x in up]
+        for name, places in (("", up), ("_upside_down", down)):
             self._lines.append(
                 f"section{i}{name} = ub.Section.of_fibres([{', '.join(places)}], [{areas}], "
                 f"{stiff}, fibres=ub.Fibres({law}{crack}))"
             )
 
-    # -- connectors ----------------------------------------------------------------------------
-
     def _laws(self, stiffness, way, force, dimensions, joint=None):
-        """Laws that connectors may have, by name.
-
-        Args:
-            stiffness, way, force: Their sizes in SI.
-            dimensions: Of stiffness, motion, force and viscosity.
-            joint: One that presses.
-        """
+        """Laws of connectors by name; dimensions of stiffness, motion, force and viscosity."""
         say, (of_k, of_e, of_f, of_c) = self._say, dimensions
         k, f = stiffness * self._size(-1.5, 1), force * self._size(-1.5, 0)
         c = stiffness * self._T * self._size(-2, 0)
@@ -215,15 +199,14 @@ class Laws(Draws):
         yields = self._yielding(name, say.number(f, of_f), f, k, (of_k, of_c))
         breaks = self._softening(f, f**2 / k * self._size(0.3, 1.5), (of_f, "J"))
         ω = say.number(self._some(1, 6) / self._end, "1/s")
-        self._last_limits = (low, high)
         text, of = say.number(k, of_k), say.number(f, of_f)
+        cubic = f"{say.number(k / way**2, cubic)} * e**3"
+        viscous = f"{say.number(0.0 if self._static else c, of_c)} * rate"
         laws = {
             "Spring": f"ub.Spring({text})",
             "yields": f"ub.Spring({text}, law={yields})",
             "breaks": f"ub.Spring({text}, softening={breaks})",
-            "Function": f"ub.ForceLaw(lambda e, rate: {text} * e + "
-            f"{say.number(k / way**2, cubic)} * e**3 + "
-            f"{say.number(0.0 if self._static else c, of_c)} * rate)",
+            "Function": f"ub.ForceLaw(lambda e, rate: {text} * e + {cubic} + {viscous})",
             "Stop": f"ub.Stop({text}, low={say.number(-low, of_e)}, high={say.number(high, of_e)})",
             "Damper": f"ub.Damper({say.number(c, of_c)})",
             "PrescribedForce": f"ub.PrescribedForce(lambda t: {of} * math.sin({ω} * t))",
@@ -244,22 +227,22 @@ class Laws(Draws):
             kinds += ["Coulomb", "Coulomb"] if self._rubs else []
         return kinds
 
+    def _resist(self, text, laws):
+        """A connector in a joint, with one of some laws in the text."""
+        kind = self._one(self._kinds(*(["PrescribedMotion"] if self._may_hold else [])))
+        if self._static and kind in ("breaks", "yields"):
+            kind = "Spring"
+        self._lists["connectors"].append(text.format(laws[kind]))
+
     def _turn(self, a, b, joint):
         """Something that resists or drives a rotation."""
         laws = self._laws(self._M, 3.0, self._M, ("N m", "1", "N m", "N m s"), joint)
-        kind = self._one(self._kinds(*(["PrescribedMotion"] if self._may_hold else [])))
-        if self._static and kind in ("breaks", "yields"):
-            kind = "Spring"
-        self._lists["connectors"].append(f"ub.Turn({a}, {b}, {laws[kind]})")
+        self._resist(f"ub.Turn({a}, {b}, {{}})", laws)
 
     def _slide(self, a, b, along, joint):
         """Something that resists or drives a sliding along an axis."""
-        dimensions = ("N/m", "m", "N", "N s/m")
-        laws = self._laws(self._F / self._L, self._L, self._F, dimensions, joint)
-        kind = self._one(self._kinds(*(["PrescribedMotion"] if self._may_hold else [])))
-        if self._static and kind in ("breaks", "yields"):
-            kind = "Spring"
-        self._lists["connectors"].append(f"ub.Slide({a}, {b}, {laws[kind]}, axis={along})")
+        laws = self._laws(self._F / self._L, self._L, self._F, OF_LENGTHS, joint)
+        self._resist(f"ub.Slide({a}, {b}, {{}}, axis={along})", laws)
 
     def _connector(self):
         """Something between two parts, or a part and the ground."""
@@ -269,13 +252,11 @@ class Laws(Draws):
         first = f"ub.ground(*{self._say.point(far)})" if grounded else str(a)
         apart = math.dist(far if grounded else a.point, b.point)
         along = self._say.vector(self._polar(1.0))
-        dimensions = ("N/m", "m", "N", "N s/m")
-        laws = self._laws(self._F / self._L, self._L, self._F, dimensions)
+        laws = self._laws(self._F / self._L, self._L, self._F, OF_LENGTHS)
         kind, stretch = self._one(self._kinds()), self._chance(0.6)
+        text = f"ub.Slide({first}, {b}, {laws[kind]}, axis={along})"
         if stretch and apart > 0.2 * self._L:
             both = [first, str(b)]
             self._shuffle(both)
             text = f"ub.Stretch({both[0]}, {both[1]}, {laws[kind]})"
-        else:
-            text = f"ub.Slide({first}, {b}, {laws[kind]}, axis={along})"
         self._lists["connectors"].append(text)

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Random machines of everything that a scene may have, each a script that anybody can run.
 
-`script(seed)` writes Python that makes `scene`, `scheme` and `dt`.  All numbers are plain, so that
-a seed that fails can be printed, and cut down by hand.  Sizes are drawn as parts of what the first
-beam makes natural (its length, EI/L², its period) and these over many decades; kinds of laws,
-joints and schemes are drawn from short lists, for each kind compiles forms of its own.
+Sizes are drawn over many decades, as parts of the length of the first beam, EI/L² and its period;
+kinds of laws, joints and schemes from short lists, for each compiles forms of its own.
 """
 
 import math
 
 import numpy as np
-from random_laws import Draws
+from random_laws import IMPORTS, Draws
+from scene_statements import PARTS, scene_call
 
 STEPS = 10
 """Steps of a run."""
@@ -25,21 +24,15 @@ def script(seed):
 
 
 class _Writer(Draws):
-    """Draws a machine and writes it down.
-
-    Attributes:
-        lines: The script so far.
-    """
+    """Draws a machine and writes it down."""
 
     def __init__(self, seed):
         self._random = np.random.default_rng(seed)
-        self.lines = [f"# seed {seed}", "import math", "import ufl_beam as ub"]
-        self.lines += ["import ufl_beam.structures as st", ""]
+        self.lines = [f"# seed {seed}", *IMPORTS]
         self._static = self._chance(0.3)
-        self._anchors, self._beams, self._bodies, self._velocities = [], [], [], []
-        self._joints, self._supports, self._loads, self._masses = [], [], [], []
-        self._connectors, self._damping, self._initial, self._held = [], [], [], set()
-        self._scales()
+        self._parts, self._anchors = {name: [] for name in PARTS}, []
+        self._draw_scales((-2, 2), (0.7, 3), (-2, 8), (-3, 3))
+        self._dt = self._T * self._size(-3, 0)
         self._free = not self._static and self._chance(0.2)
         for i in range(self._integer(1, 4)):
             self._beam(i)
@@ -54,22 +47,11 @@ class _Writer(Draws):
             self._damp()
         self._end()
 
-    # -- draws ---------------------------------------------------------------------------------
-
     def _vector(self, size):
-        angle = self._some(-math.pi, math.pi)
-        return f"({size * math.cos(angle):.6g}, {size * math.sin(angle):.6g})"
+        return "({:.6g}, {:.6g})".format(*self._polar(size))
 
-    # -- sizes ---------------------------------------------------------------------------------
-
-    def _scales(self):
-        self._L = self._size(-2, 2)
-        self._slender = self._size(0.7, 3)
-        self._EI, self._rhoA = self._size(-2, 8), self._size(-3, 3)
-        self._F, self._M = self._EI / self._L**2, self._EI / self._L
-        self._EA = self._EI * (self._slender / self._L) ** 2
-        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
-        self._dt = self._T * self._size(-3, 0)
+    def _add(self, part, text):
+        self._parts[part].append(text)
 
     def _time(self):
         """A time function."""
@@ -83,21 +65,17 @@ class _Writer(Draws):
             kinds += ["lambda t: 1.0", f"lambda t: float(t < {t / 3:.6g})"]
         return self._one(kinds)
 
-    # -- materials -----------------------------------------------------------------------------
-
     def _hardening(self, stiffness, limit):
         """A law of a resultant, a fibre or a spring; sizes of stiffness and force."""
         more = [f"yield_limit={limit}"]
-        if self._chance(0.5):
-            more.append(f"isotropic={stiffness * self._size(-4, 0):.6g}")
-        if self._chance(0.5):
-            more.append(f"kinematic={stiffness * self._size(-4, 0):.6g}")
+        for kind in ("isotropic", "kinematic"):
+            if self._chance(0.5):
+                more.append(f"{kind}={stiffness * self._size(-4, 0):.6g}")
         time = self._one([0.0, math.inf, self._T * self._size(-6, 6)])
         viscous = self._one(["", "Perzyna", "DuvautLions"])
-        if viscous == "Perzyna":
-            more.append(f"viscosity=ub.Perzyna({_number(time * stiffness)})")
-        if viscous == "DuvautLions":
-            more.append(f"viscosity=ub.DuvautLions({_number(time)})")
+        if viscous:
+            size = time * stiffness if viscous == "Perzyna" else time
+            more.append(f"viscosity=ub.{viscous}({_number(size)})")
         return f"ub.ElastoPlastic({', '.join(more)})"
 
     def _softening(self, limit):
@@ -113,43 +91,45 @@ class _Writer(Draws):
         EA, EI, rhoA = self._EA * stiff, self._EI * stiff, self._rhoA * self._size(-1, 1)
         limit = self._M * self._size(-3, 1) * stiff
         if kind == "fibres":
-            h = math.sqrt(12 * EI / EA)
-            E, strength = EA / h**2, limit / h**3
-            drawn = [
-                _number(strength),
-                f"ub.distributions.Normal({strength:.6g}, {strength / 5:.6g}, seed={i})",
-                f"ub.distributions.Lognormal({strength:.6g}, {strength / 3:.6g}, seed={i})",
-                f"ub.distributions.Weibull({strength:.6g}, 3.0, seed={i})",
-            ]
-            law = self._hardening(E, self._one(drawn))
-            crack = ""
-            if self._chance(0.3):
-                energy = strength * h * self._size(-3, 2)
-                numbers = f"limit={3 * strength:.6g}, fracture_energy={energy:.6g}"
-                crack = f", softening=ub.Softening({numbers})"
-            shape = self._one([f"rectangle(b={h:.6g}, h={h:.6g}", f"circle(d={h:.6g}"])
-            text = (
-                f"ub.Section.{shape}, E={E:.6g}, nu=0.3, rho={rhoA / h**2:.6g}, "
-                f"fibres=ub.Fibres({law}, number={self._one([4, 8])}{crack}))"
-            )
+            text = self._of_fibres(i, EA, EI, rhoA, limit)
         else:
-            rhoI = self._one([0.0, rhoA * EI / EA, rhoA * EI / EA])
-            more = [f"EA={EA:.6g}, GA={EA * self._some(0.1, 0.5):.6g}, EI={EI:.6g}"]
-            more.append(f"rhoA={rhoA:.6g}, rhoI={rhoI:.6g}")
-            if kind in ("resultants", "both"):
-                more.append(f"bending={self._hardening(EI, _number(limit))}")
-                if self._chance(0.3):
-                    force = limit / self._L * self._slender
-                    more.append(f"axial={self._hardening(EA, _number(force))}")
-                if self._chance(0.3):
-                    more.append(f"shear={self._hardening(EA, _number(limit / self._L))}")
-            if kind in ("hinge", "both") and self._chance(0.7):
-                more.append(f"hinge={self._softening(limit * self._size(-1, 1))}")
-            text = f"ub.Section({', '.join(more)})"
-        self.lines.append(f"section{i} = {text}")
+            text = self._of_resultants(kind, EA, EI, rhoA, limit)
+        self.lines.append(f"section{i} = ub.Section{text}")
         return kind, limit
 
-    # -- beams and bodies ----------------------------------------------------------------------
+    def _of_fibres(self, i, EA, EI, rhoA, limit):
+        h = math.sqrt(12 * EI / EA)
+        E, strength = EA / h**2, limit / h**3
+        drawn = [
+            _number(strength),
+            f"ub.distributions.Normal({strength:.6g}, {strength / 5:.6g}, seed={i})",
+            f"ub.distributions.Lognormal({strength:.6g}, {strength / 3:.6g}, seed={i})",
+            f"ub.distributions.Weibull({strength:.6g}, 3.0, seed={i})",
+        ]
+        law, crack = self._hardening(E, self._one(drawn)), ""
+        if self._chance(0.3):
+            energy = strength * h * self._size(-3, 2)
+            numbers = f"limit={3 * strength:.6g}, fracture_energy={energy:.6g}"
+            crack = f", softening=ub.Softening({numbers})"
+        shape = self._one([f"rectangle(b={h:.6g}, h={h:.6g}", f"circle(d={h:.6g}"])
+        return (
+            f".{shape}, E={E:.6g}, nu=0.3, rho={rhoA / h**2:.6g}, "
+            f"fibres=ub.Fibres({law}, number={self._one([4, 8])}{crack}))"
+        )
+
+    def _of_resultants(self, kind, EA, EI, rhoA, limit):
+        rhoI = self._one([0.0, rhoA * EI / EA, rhoA * EI / EA])
+        more = [f"EA={EA:.6g}, GA={EA * self._some(0.1, 0.5):.6g}, EI={EI:.6g}"]
+        more.append(f"rhoA={rhoA:.6g}, rhoI={rhoI:.6g}")
+        if kind in ("resultants", "both"):
+            more.append(f"bending={self._hardening(EI, _number(limit))}")
+            force = limit / self._L
+            for name, size in (("axial", force * self._slender), ("shear", force)):
+                if self._chance(0.3):
+                    more.append(f"{name}={self._hardening(EA, _number(size))}")
+        if kind in ("hinge", "both") and self._chance(0.7):
+            more.append(f"hinge={self._softening(limit * self._size(-1, 1))}")
+        return f"({', '.join(more)})"
 
     def _beam(self, i):
         kind, limit = self._section(i)
@@ -171,13 +151,11 @@ class _Writer(Draws):
         self.lines.append(f"{name} = ub.Beam((x{i}, y{i}), {end}, {more})")
         if i:
             self._join(joint, parent, f"{name}.at(0.0)", beam=name)
-        self._beams.append(name)
-        self._velocities.append(name)
+        self._add("beams", name)
         self._anchors += [f"{name}.at({s})" for s in SPOTS]
 
     def _body(self, i):
-        name = f"body{i}"
-        parent = self._one(self._anchors)
+        name, parent = f"body{i}", self._one(self._anchors)
         mass = self._rhoA * self._L * self._size(-3, 3)
         self.lines.append(f"bx{i}, by{i} = {parent}.point")
         dx, dy = (self._L * self._some(-0.3, 0.3) for _ in range(2))
@@ -188,21 +166,18 @@ class _Writer(Draws):
         )
         joint = "Rigid" if self._static else self._one(["Rigid", "Rigid", "Revolute"])
         self._join(joint, parent, f"{name}.at(bx{i}, by{i})")
-        self._bodies.append(name)
-        self._velocities.append(name)
+        self._add("bodies", name)
         self._anchors.append(f"{name}.at(bx{i} + {self._L / 5:.6g}, by{i})")
 
     def _joint_kind(self):
-        if self._static:
-            return self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
-        return self._one(
-            ["Rigid", "Rigid", "Revolute", "Prismatic", "RigidLink", "Link", "Release"]
-        )
+        kinds = ["Rigid", "Rigid", "Revolute", "RigidLink"]
+        if not self._static:
+            kinds[3:] = ["Prismatic", "RigidLink", "Link", "Release"]
+        return self._one(kinds)
 
     def _join(self, kind, a, b, beam=None):
         """A joint; in statics, what turns is held by a connector."""
-        more = ""
-        name = f"joint{len(self._joints)}"
+        more, name = "", f"joint{len(self._parts['joints'])}"
         if kind in ("Rigid", "Revolute") and (self._chance(0.3) or self._static):
             more = ", multipliers=True"
         if kind == "Prismatic":
@@ -211,11 +186,9 @@ class _Writer(Draws):
             a, b = f"{beam}.at(0.0)", a
             more = f", free='{self._one(['N', 'V', 'M', 'NM'])}'"
         self.lines.append(f"{name} = ub.{kind}({a}, {b}{more})")
-        self._joints.append(name)
+        self._add("joints", name)
         if kind == "Revolute" and (self._static or (more and self._chance(0.7))):
             self._turn(a, b, name)
-
-    # -- connectors ----------------------------------------------------------------------------
 
     def _turn(self, a, b, joint):
         size = self._M * self._size(-2, 1)
@@ -226,7 +199,7 @@ class _Writer(Draws):
                 f"ub.Coulomb({size:.6g})",
                 f"ub.Coulomb({size:.6g}, coefficient={self._L * 0.1:.6g}, joint={joint})",
             ]
-        self._connectors.append(f"ub.Turn({a}, {b}, {self._one(laws)})")
+        self._add("connectors", f"ub.Turn({a}, {b}, {self._one(laws)})")
 
     def _connector(self):
         a, b = self._one(self._anchors), self._one(self._anchors)
@@ -239,12 +212,8 @@ class _Writer(Draws):
         if not self._static:
             laws.append(f"ub.Controller(lambda simulation: -{force:.6g} * math.sin(simulation.t))")
         law = self._one(laws)
-        self._connectors.append(
-            self._one([
-                f"ub.Stretch({a}, {b}, {law})",
-                f"ub.Slide({a}, {b}, {law}, axis={self._vector(1.0)})",
-            ])
-        )  # fmt: skip
+        slide = f"ub.Slide({a}, {b}, {law}, axis={self._vector(1.0)})"
+        self._add("connectors", self._one([f"ub.Stretch({a}, {b}, {law})", slide]))
 
     def _spring(self, stiffness, force):
         k = stiffness * self._size(-3, 5)
@@ -272,16 +241,13 @@ class _Writer(Draws):
         ω = self._some(1, 6) / (self._dt * STEPS)
         return f"lambda t: {size * self._size(-3, 0):.6g} * (1 - math.cos({ω:.6g} * t))"
 
-    # -- supports ------------------------------------------------------------------------------
-
     def _support(self):
         if self._free:
             if self._chance(0.7):
-                self._initial.append(
-                    f"ub.Velocity([{', '.join(self._velocities)}], "
-                    f"linear={self._vector(self._L / self._T)}, "
-                    f"angular={self._some(-3, 3) / self._T:.6g}, about=(0.0, 0.0))"
-                )
+                moving = ", ".join(self._parts["beams"] + self._parts["bodies"])
+                linear = self._vector(self._L / self._T)
+                angular = f"{self._some(-3, 3) / self._T:.6g}, about=(0.0, 0.0)"
+                self._add("initial", f"ub.Velocity([{moving}], linear={linear}, angular={angular})")
             return
         root = "beam0.at(0.0)"
         moved = [
@@ -291,19 +257,15 @@ class _Writer(Draws):
         kinds = [f"ub.Clamped({root})", f"ub.Clamped({root})", *moved]
         if not self._static:
             kinds += [f"ub.Pinned({root})", f"ub.Roller({root}, along={self._vector(1.0)})"]
-        self._supports.append(self._one(kinds))
-        last = f"{self._beams[-1]}.at(1.0)"
+        self._add("supports", self._one(kinds))
+        last = f"{self._parts['beams'][-1]}.at(1.0)"
         if self._chance(0.3):
-            others = [f"ub.Roller({last}, along={self._vector(1.0)})", f"ub.Pinned({last})"]
-            self._supports.append(self._one(others))
+            roller = f"ub.Roller({last}, along={self._vector(1.0)})"
+            self._add("supports", self._one([roller, f"ub.Pinned({last})"]))
         elif self._chance(0.15):
-            direction = self._vector(self._L)
-            self._joints.append(
-                f"ub.Guided({last}, lambda s, p={last}.point, d={direction}: "
-                "(p[0] + s * d[0], p[1] + s * d[1] + s**2 * d[0]))"
-            )
-
-    # -- loads ---------------------------------------------------------------------------------
+            curve = f"lambda s, p={last}.point, d={self._vector(self._L)}: "
+            curve += "(p[0] + s * d[0], p[1] + s * d[1] + s**2 * d[0])"
+            self._add("joints", f"ub.Guided({last}, {curve})")
 
     def _load(self):
         size = self._F * self._size(-4, 0)
@@ -313,49 +275,31 @@ class _Writer(Draws):
         if place.startswith("beam"):
             kinds.append(f"ub.FollowerLoad({place}, force={force}, amplitude={time})")
         line = self._vector(size / self._L)
-        kinds.append(f"ub.LineLoad({self._one(self._beams)}, force={line}, amplitude={time})")
+        beam = self._one(self._parts["beams"])
+        kinds.append(f"ub.LineLoad({beam}, force={line}, amplitude={time})")
         kinds.append(f"ub.Gravity({self._vector(size / self._rhoA / self._L)}, amplitude={time})")
-        self._loads.append(self._one(kinds))
+        self._add("loads", self._one(kinds))
         if self._chance(0.3):
             mass = self._rhoA * self._L * self._size(-3, 3)
             inertia = self._one([0.0, mass * self._L**2 * self._size(-3, 0)])
-            place = f"{self._one(self._beams)}.at({self._one(SPOTS)})"
-            self._masses.append(f"ub.PointMass({place}, {mass:.6g}, {inertia:.6g})")
+            place = f"{self._one(self._parts['beams'])}.at({self._one(SPOTS)})"
+            self._add("masses", f"ub.PointMass({place}, {mass:.6g}, {inertia:.6g})")
 
     def _damp(self):
         if self._chance(0.5):
             mass, stiffness = self._size(-3, 0) / self._T, self._size(-4, 0) * self._T
-            self._damping.append(f"ub.Rayleigh(mass={mass:.6g}, stiffness={stiffness:.6g})")
+            self._add("damping", f"ub.Rayleigh(mass={mass:.6g}, stiffness={stiffness:.6g})")
         else:
-            self._damping.append(f"ub.KelvinVoigt({self._size(-4, 1) * self._T:.6g})")
-
-    # -- the end -------------------------------------------------------------------------------
+            self._add("damping", f"ub.KelvinVoigt({self._size(-4, 1) * self._T:.6g})")
 
     def _end(self):
-        parts = {
-            "beams": self._beams, "bodies": self._bodies, "joints": self._joints,
-            "supports": self._supports, "connectors": self._connectors, "loads": self._loads,
-            "masses": self._masses, "damping": self._damping, "initial": self._initial,
-        }  # fmt: skip
-        self.lines.append("scene = ub.Scene(")
-        for name, records in parts.items():
-            if records:
-                self.lines.append(f"    {name}=[")
-                self.lines += [f"        {record}," for record in records]
-                self.lines.append("    ],")
-        self.lines.append(")")
-        if self._static:
-            schemes = [
-                "Static()",
-                "Static()",
-                "EnergyMomentumStatic()",
-                "EnergyMomentumStatic(0.5)",
-            ]
-        else:
+        theta = "EnergyMomentumStatic()", "EnergyMomentumStatic(0.5)"
+        schemes = ["Static()", "Static()", *theta]
+        if not self._static:
             a, b = self._some(0.01, 0.5), self._some(0, 0.5)
             schemes = ["EnergyMomentum()", "EnergyMomentum()", f"EnergyMomentum({a:.3g}, {b:.3g})"]
-        self.lines.append(f"scheme = ub.{self._one(schemes)}")
-        self.lines.append(f"dt = {self._dt:.6g}")
+        self.lines += scene_call(self._parts)
+        self.lines += [f"scheme = ub.{self._one(schemes)}", f"dt = {self._dt:.6g}"]
 
 
 def _number(x):
@@ -363,10 +307,7 @@ def _number(x):
 
 
 def round_off(solution):
-    """Energy that the last digits of strains make, and its change by the strains that there are; J.
-
-    A strain is a difference of positions, which have digits of the size of the scene, over a cell.
-    """
+    """Energy that the last digits of strains make, of positions over a cell; J."""
     scene = solution.scene
     last = np.finfo(float).eps * scene.size
     least = 0.0

@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Random scenes of all public objects and schemes, each a script that anybody can run.
 
-`script(seed, statement)` writes Python that makes `scene`, `scheme`, `times`, `dt` and `mesh`.  All
-draws are those of the seed; the statement decides only how the scene is stated.  Sizes follow from
-what the first beam makes natural: its length L, EI/L², its period.  They make motions that are
-large and yet regular: a scene whose motion depends on its last digits would show nothing.
-
-Scattered limits depend on where beams begin and end, to the last digit.  Scenes that have them can
-be compared in another order only.
+Sizes follow from the length of the first beam, EI/L² and its period, so that motions are large and
+yet regular.  Scattered limits depend on the last digits of places: such scenes are reordered only.
 """
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from random_laws import Laws
-from scene_statements import AS_GIVEN, MotionGeometry
+from random_laws import IMPORTS, Laws
+from scene_statements import AS_GIVEN, PARTS, MotionGeometry, scene_call
 
 STEPS = 15
 """Steps of a run of equal ones."""
@@ -26,28 +22,19 @@ SAMPLE = 9, 27, 34, 38, 51, 91, 99, 110, 113, 150, 151, 164, 165, 175, 184, 190
 SPOTS = (0.0, 0.25, 1 / 3, 0.5, 1.0)
 """Where things are attached to beams."""
 
-PARTS = (
-    "beams", "bodies", "joints", "supports", "connectors", "loads", "masses", "damping", "initial",
-)  # fmt: skip
-
 
 def script(seed, statement=AS_GIVEN):
     """Python source of a random scene."""
     return _Writer(seed, statement).source() + "\n"
 
 
-class _Anchor:
-    """A place on a beam, a point of a body or of the ground.
+class _Anchor(NamedTuple):
+    """A place as it is written, its point in the first statement, and the part that it is of."""
 
-    Attributes:
-        text: As it is written.
-        point: Where it is in the first statement; m.
-        part: Of which beam, body or the ground it is.
-        is_end: Whether it is an end of a beam.
-    """
-
-    def __init__(self, text, point, part, is_end=False):
-        self.text, self.point, self.part, self.is_end = text, point, part, is_end
+    text: str
+    point: tuple
+    part: str
+    is_end: bool = False
 
     def __str__(self):
         return self.text
@@ -62,22 +49,21 @@ class _Writer(Laws):
         self._scattered = self._chance(0.1)
         self._say = MotionGeometry(statement, places_stay=self._scattered)
         self._lists = {name: [] for name in PARTS}
-        self._lines = [
-            f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}",
-            "import math",
-            "import ufl_beam as ub",
-            "import ufl_beam.structures as st",
-            "",
-        ]
-        self._statement, self._parts, self._anchors = statement, [], []
+        title = f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}"
+        self._lines = [title, *IMPORTS]
+        self._statement, self._anchors = statement, []
         self._flips = np.random.default_rng(statement.backwards)
         self._order = np.random.default_rng(statement.shuffled)
-        self._scales()
+        self._static = self._chance(0.25)
+        self._draw_scales((-1, 1), (1, 2), (-1, 5), (-1, 1))
+        self._dt = self._T * self._size(-2, -0.7)
+        self._end = STEPS * self._dt
         self._scheme()
         self._elastic = self._chance(0.3) and not self._scattered
         self._beam(None)
         for _ in range(self._integer(0, 3)):
-            self._part()
+            parent = self._one(self._anchors)
+            (self._beam if self._chance(0.65) else self._body)(parent)
         self._root()
         self._second_support()
         for _ in range(self._integer(0, 2)):
@@ -88,25 +74,6 @@ class _Writer(Laws):
         self._damp()
         self._frame()
         self._mesh()
-
-    # -- draws ---------------------------------------------------------------------------------
-
-    def _polar(self, size):
-        angle = self._some(-math.pi, math.pi)
-        return size * math.cos(angle), size * math.sin(angle)
-
-    # -- sizes and schemes ---------------------------------------------------------------------
-
-    def _scales(self):
-        self._static = self._chance(0.25)
-        self._L = self._size(-1, 1)
-        self._slender = self._size(1, 2)
-        self._EI, self._rhoA = self._size(-1, 5), self._size(-1, 1)
-        self._F, self._M = self._EI / self._L**2, self._EI / self._L
-        self._EA = self._EI * (self._slender / self._L) ** 2
-        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
-        self._dt = self._T * self._size(-2, -0.7)
-        self._end = STEPS * self._dt
 
     def _scheme(self):
         a, b = self._some(0.01, 0.5), self._some(0, 0.5)
@@ -146,11 +113,9 @@ class _Writer(Laws):
             kinds += ["lambda t: 1.0", f"lambda t: 1.0 - math.cos({ω} * t)"]
         return self._one(kinds)
 
-    # -- beams and bodies ----------------------------------------------------------------------
-
     def _beam(self, parent):
         """A beam, joined to an anchor if there is one."""
-        i = sum(part.startswith("beam") for part in self._parts)
+        i = len(self._lists["beams"])
         name = f"beam{i}"
         _, hinges = self._section(i)
         joint, gap = self._kind_of_joint(parent)
@@ -168,7 +133,6 @@ class _Writer(Laws):
             more += f", hinges={{{', '.join(f'{s!r}: {law}' for s, law in laws.items())}}}"
         way = f"  # {name} runs backwards" if backwards else ""
         self._lines.append(f"{name} = ub.Beam{text}, {more}){way}")
-        self._parts.append(name)
         self._lists["beams"].append(name)
 
         def at(s):
@@ -230,38 +194,26 @@ class _Writer(Laws):
             b = [(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3]
             return tuple(sum(w * p[k] for w, p in zip(b, points, strict=True)) for k in (0, 1))
 
-        a, b, c, d = self._ends(points, backwards)
         lines = (
-            f"lambda s, p=({a}, {b}, {c}, {d}): tuple((1 - s)**3 * p[0][k] + "
-            "3 * s * (1 - s)**2 * p[1][k] + 3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] "
-            "for k in (0, 1))"
+            f"lambda s, p=({', '.join(self._ends(points, backwards))}): tuple("
+            "(1 - s)**3 * p[0][k] + 3 * s * (1 - s)**2 * p[1][k] + "
+            "3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] for k in (0, 1))"
         )
         return axis, f".along({lines}"
 
-    def _part(self):
-        parent = self._one(self._anchors)
-        if self._chance(0.65):
-            self._beam(parent)
-        else:
-            self._body(parent)
-
     def _body(self, parent):
-        i = sum(part.startswith("body") for part in self._parts)
-        name, say = f"body{i}", self._say
+        name, say = f"body{len(self._lists['bodies'])}", self._say
         mass = self._rhoA * self._L * self._size(-0.5, 1)
         inertia = mass * self._L**2 * self._size(-1.5, -0.5)
         joint = self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
-        if self._static and joint == "Revolute":
-            joint = "Rigid"
+        joint = "Rigid" if self._static and joint == "Revolute" else joint
         away = tuple(self._L * self._some(-0.3, 0.3) for _ in range(2))
         if self._chance(0.3) or not self._may_hold:
             away = (0.0, 0.0)
         middle = tuple(np.add(parent.point, away))
-        self._lines.append(
-            f"{name} = ub.Body({say.point(middle)}, mass={say.number(mass, 'kg')}, "
-            f"inertia={say.number(inertia, 'kg m2')}, name='{name}')"
-        )
-        self._parts.append(name)
+        numbers = f"{say.point(middle)}, mass={say.number(mass, 'kg')}"
+        numbers += f", inertia={say.number(inertia, 'kg m2')}"
+        self._lines.append(f"{name} = ub.Body({numbers}, name='{name}')")
         self._lists["bodies"].append(name)
         center = _Anchor(f"{name}.middle", middle, name)
 
@@ -275,8 +227,6 @@ class _Writer(Laws):
         self._anchors.append(center)
         if self._may_hold:
             self._anchors.append(at(tuple(np.add(middle, (self._L / 5, self._L / 7)))))
-
-    # -- joints --------------------------------------------------------------------------------
 
     def _kind_of_joint(self, parent):
         """Kind, and how far apart its places are."""
@@ -320,8 +270,6 @@ class _Writer(Laws):
         if self._statement.shuffled is not None:
             self._order.shuffle(records)
 
-    # -- supports ------------------------------------------------------------------------------
-
     def _root(self):
         """What holds the first beam at its start."""
         place, say = self._start, self._say
@@ -364,10 +312,9 @@ class _Writer(Laws):
             moving = list(self._lists["beams"] + self._lists["bodies"])
             self._shuffle(moving)
             linear = say.vector(linear, "m/s") if kind == "free" else "(0.0, 0.0)"
-            self._lists["initial"].append(
-                f"ub.Velocity([{', '.join(moving)}], linear={linear}, "
-                f"angular={say.number(angular, '1/s')}, about={say.point(place.point)})"
-            )
+            motion = f"linear={linear}, angular={say.number(angular, '1/s')}"
+            motion += f", about={say.point(place.point)}"
+            self._lists["initial"].append(f"ub.Velocity([{', '.join(moving)}], {motion})")
 
     def _second_support(self):
         """Often the end of the last beam is held, too."""
@@ -387,12 +334,11 @@ class _Writer(Laws):
         angle, bend = self._some(-math.pi, math.pi), self._some(-0.5, 0.5) / self._L
         t = self._say.vector((math.cos(angle), math.sin(angle)))
         n = self._say.vector((-math.sin(angle), math.cos(angle)))
-        self._lists["joints"].append(
-            f"ub.Guided({place}, lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple("
-            f"p[k] + s * t[k] + {self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1)))"
+        curve = (
+            f"lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple(p[k] + s * t[k] + "
         )
-
-    # -- loads, masses, damping ----------------------------------------------------------------
+        curve += f"{self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1))"
+        self._lists["joints"].append(f"ub.Guided({place}, {curve})")
 
     def _load(self):
         size, say = self._F * self._size(-1.3, 0), self._say
@@ -420,52 +366,38 @@ class _Writer(Laws):
         inertia = self._one([0.0, mass * self._L**2 * self._size(-2, -1)])
         place, say = self._one([a for a in self._anchors if a.part.startswith("beam")]), self._say
         if self._chance(0.3):
-            self._lists["masses"].append(
-                f"ub.PointMass({place}, {say.number(mass, 'kg')}, {say.number(inertia, 'kg m2')})"
-            )
+            numbers = f"{say.number(mass, 'kg')}, {say.number(inertia, 'kg m2')}"
+            self._lists["masses"].append(f"ub.PointMass({place}, {numbers})")
 
     def _damp(self):
         mass, stiffness = self._size(-3, -1) / self._T, self._size(-4, -2) * self._T
-        beams = list(self._lists["beams"][:1])
-        viscous = self._say.number(self._size(-4, -1) * self._T, "s")
+        say, damping = self._say.number, self._lists["damping"]
+        viscous = say(self._size(-4, -1) * self._T, "s")
         kind = self._one(["", "", "Rayleigh", "KelvinVoigt", "both"])
         if kind in ("Rayleigh", "both") and not self._static:
-            self._lists["damping"].append(
-                f"ub.Rayleigh(mass={self._say.number(mass, '1/s')}, "
-                f"stiffness={self._say.number(stiffness, 's')})"
-            )
-        if kind == "KelvinVoigt":
-            self._lists["damping"].append(f"ub.KelvinVoigt({viscous})")
-        if kind == "both":
-            self._lists["damping"].append(f"ub.KelvinVoigt({viscous}, beams=[{', '.join(beams)}])")
+            factors = f"mass={say(mass, '1/s')}, stiffness={say(stiffness, 's')}"
+            damping.append(f"ub.Rayleigh({factors})")
+        if kind in ("KelvinVoigt", "both"):
+            beams = ", beams=[beam0]" if kind == "both" else ""
+            damping.append(f"ub.KelvinVoigt({viscous}{beams})")
 
     def _frame(self):
         """A frame that turns, with so much centrifugal force as other loads."""
         rate, about = self._some(-1, 1) / self._T, self._polar(self._L)
         turns = self._chance(0.15)
         if turns and (self._rubs or self._name == "Static()"):
-            self._lists["loads"].append(
-                f"ub.RotatingFrame({self._say.number(rate, '1/s')}, about={self._say.point(about)})"
-            )
+            rate, about = self._say.number(rate, "1/s"), self._say.point(about)
+            self._lists["loads"].append(f"ub.RotatingFrame({rate}, about={about})")
 
     def _mesh(self):
         refine, degree = self._one([1, 1, 1, 2]), self._one([1, 1, 2, 3])
-        lumped = self._chance(0.2)
-        self._lines.append(
-            f"mesh = ub.Mesh({refine}, degree={degree if self._elastic else 1}, lumped={lumped})"
-        )
-
-    # -- the end -------------------------------------------------------------------------------
+        lumped, degree = self._chance(0.2), degree if self._elastic else 1
+        self._lines.append(f"mesh = ub.Mesh({refine}, degree={degree}, lumped={lumped})")
 
     def source(self):
         """The script."""
-        lines = [*self._lines, "scene = ub.Scene("]
-        for name, records in self._lists.items():
-            if records:
-                self._shuffle(records)
-                lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
-        lines += [
-            ")", f"scheme = ub.{self._name}",
-            f"times = (0.0, {self._say.number(self._end, 's')})", f"dt = {self._step}",
-        ]  # fmt: skip
-        return "\n".join(lines)
+        for records in filter(None, self._lists.values()):
+            self._shuffle(records)
+        times = f"times = (0.0, {self._say.number(self._end, 's')})"
+        scheme, dt = f"scheme = ub.{self._name}", f"dt = {self._step}"
+        return "\n".join([*self._lines, *scene_call(self._lists), scheme, times, dt])

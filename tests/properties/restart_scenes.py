@@ -36,12 +36,10 @@ def machine(dynamic=True):
     steel = {"EA": 1e5, "GA": 1e5, "EI": 40.0, "rhoA": 0.5, "rhoI": 0.01}
     creep = ub.ElastoPlastic(yield_limit=0.5, kinematic=3.0, viscosity=ub.Perzyna(0.05))
     hinged = ub.Section(**steel, bending=creep)
+    law = ub.ElastoPlastic(ub.distributions.TruncatedNormal(1e5, 2e4, seed=7))
     fibres = ub.Section.rectangle(
-        b=0.02, h=0.05, E=1e8, nu=0.3, rho=500.0,
-        fibres=ub.Fibres(
-            ub.ElastoPlastic(ub.distributions.TruncatedNormal(1e5, 2e4, seed=7)), number=6
-        ),
-    )  # fmt: skip
+        b=0.02, h=0.05, E=1e8, nu=0.3, rho=500.0, fibres=ub.Fibres(law, number=6)
+    )
     a = ub.Body((0, 0), mass=2.0, inertia=0.3, name="a")
     b = ub.Body((1, 0), mass=1.0, inertia=0.1, name="b")
     c = ub.Body((2, 0.2), mass=1.0, inertia=0.2, name="c")
@@ -83,18 +81,17 @@ def machine(dynamic=True):
 
 def bend(kind="hinge"):
     """A cantilever whose end goes up and down: statics of what yields and breaks."""
-    law = {"hinge": ub.Softening(6.0, 1.5)} if kind == "hinge" else {}
     yields = ub.ElastoPlastic(yield_limit=5.0, isotropic=10.0, kinematic=5.0)
     section = ub.Section(EA=1e4, GA=1e4, EI=50.0, rhoA=1.0, rhoI=0.1, bending=yields)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=6, hinges=dict.fromkeys((0.05,), *law.values()))
+    hinges = {0.05: ub.Softening(6.0, 1.5) if kind == "hinge" else None}
+    beam = ub.Beam((0, 0), (1, 0), section, cells=6, hinges=hinges)
     wave = ub.Table([0, 1, 3, 5], [0, 0.15, -0.15, 0.2])
+    spring = ub.Spring(3.0, ub.ElastoPlastic(0.2, 1.0))
     return ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=wave)],
         loads=[ub.FollowerLoad(beam.at(0.5), force=(-1.0, 0.5), amplitude=wave)],
-        connectors=[
-            ub.Stretch(ub.ground(1, 1), beam.end, ub.Spring(3.0, ub.ElastoPlastic(0.2, 1.0)))
-        ],
+        connectors=[ub.Stretch(ub.ground(1, 1), beam.end, spring)],
     )
 
 
@@ -104,7 +101,7 @@ def arrays_of(solution):
     return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
 
 
-def run(folder, *, steps=60, every=2, record=()):
+def run(folder):
     """Go on, or begin; with files."""
     scene = machine()
     beam = scene.beams[0]
@@ -114,11 +111,8 @@ def run(folder, *, steps=60, every=2, record=()):
         ub.XDMF(folder / "run.xdmf", every=7),
         ub.VTKHDF(folder / "run.vtkhdf", every=5),
     ]
-    checkpoint = ub.Checkpoint(folder / "run.checkpoint", every=every)
-    return ub.simulate(
-        scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.005 * steps), dt=0.005, every=3,
-        record=[*files, *record], checkpoint=checkpoint,
-    )  # fmt: skip
+    more = {"record": files, "checkpoint": ub.Checkpoint(folder / "run.checkpoint", every=2)}
+    return ub.simulate(scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.3), dt=0.005, every=3, **more)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Statements of one scene that must give one motion: other axes, units, directions, orders.
 
-A scene is written as Python source by :mod:`random_scenes`.  All its numbers go through a
-:class:`Statement`, which knows what each is in the units and axes of the statement.  So any scene
-that fails can be printed and run by hand.
+All numbers of a scene go through a :class:`Statement` when it is written as Python source.
 """
 
 import math
@@ -22,6 +20,28 @@ DIMENSIONS = {
     "N s": (1, 1, -1), "N m2 s": (1, 3, -1), "N s/m": (1, 0, -1), "N m s": (1, 2, -1),
     "1/m": (0, -1, 0), "N/m3": (1, -2, -2), "1/m2": (0, -2, 0),
 }  # fmt: skip
+
+
+PARTS = (
+    "beams", "bodies", "joints", "supports", "connectors", "loads", "masses", "damping", "initial",
+)  # fmt: skip
+"""Lists of the parts of scenes."""
+
+
+def scene_call(parts):
+    """Lines of source that make a scene from texts of its parts by name."""
+    lines = ["scene = ub.Scene("]
+    for name, records in parts.items():
+        if records:
+            lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
+    return [*lines, ")"]
+
+
+def made(source):
+    """The names that a script defines."""
+    names = {}
+    exec(source, names)
+    return names
 
 
 @dataclass(frozen=True)
@@ -63,11 +83,12 @@ class Statement:
         tx, ty = self.turned(x - cx, y - cy)
         return cx + tx + dx, cy + ty + dy
 
-    def motion(self, displacement):
+    def motion(self, displacement, of_vectors="m", of_rotations="1"):
         """Displacement and rotation (n, 3) of a solution, in SI and the axes of the first one."""
         u, v, ψ = np.asarray(displacement).T
-        cos, sin, metre = math.cos(self.angle), math.sin(self.angle), self.unit("m")
-        return np.column_stack([(cos * u + sin * v) / metre, (cos * v - sin * u) / metre, ψ])
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        back = np.column_stack([cos * u + sin * v, cos * v - sin * u, ψ])
+        return back / [self.unit(x) for x in (of_vectors, of_vectors, of_rotations)]
 
 
 AS_GIVEN = Statement()
@@ -88,13 +109,7 @@ def changed_statements(seed):
 
 
 class MotionGeometry:
-    """Writes numbers as text in the units and axes of a statement.
-
-    Args:
-        statement: How the scene is stated.
-        change: Units of the last place by which numbers change where the statement says so.
-        places_stay: Whether the digits of places do not change in any case.
-    """
+    """Writes numbers in the units and axes of a statement, digits of places perhaps as they are."""
 
     def __init__(self, statement, change=4, places_stay=False):
         self.statement, self._places_stay = statement, places_stay

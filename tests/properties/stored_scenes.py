@@ -12,6 +12,7 @@ import warnings
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from mpi4py import MPI
@@ -38,12 +39,9 @@ STATIC = ub.Static, ub.EnergyMomentumStatic
 
 @dataclass
 class Draft:
-    """A scene while an effect writes into it, with its random numbers.
+    """A scene while an effect writes into it; number `changed` of the effect is another one.
 
     Attributes:
-        changed: Index of the number of the effect that is changed, or -1.
-        count: Number of numbers of the effect so far.
-        end: Time of the run; s.
         control: Control of a path, instead of a run in time.
         further: Records of the effect that the scene has in functions only.
     """
@@ -94,20 +92,10 @@ class Draft:
         self.parts.setdefault(kind, []).extend(records)
         return records[-1]
 
-    def wave(self):
+    def wave(self, low=3.0, high=6.0, power=1):
         """A function of time that begins with zero and changes its sign or its slope."""
-        ω = self.some(3.0, 6.0) / self.end
-        return lambda t: math.sin(ω * t)
-
-    def swing(self):
-        """A function of time that begins with zero and has as large values of both signs."""
-        ω = self.some(6.0, 9.0) / self.end
-        return lambda t: math.sin(ω * t)
-
-    def surge(self):
-        """A function of time of both signs that begins with zero and with zero slope."""
-        ω = self.some(8.0, 11.0) / self.end
-        return lambda t: math.sin(ω * t) ** 3
+        ω = self.some(low, high) / self.end
+        return lambda t: math.sin(ω * t) ** power
 
     def swell(self):
         """A function of time that begins with zero and with zero slope, and comes back."""
@@ -132,11 +120,7 @@ class Draft:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of the package: classes that have it, a function that writes scenes with it.
-
-    Attributes:
-        seeds: Other seeds of some scenes.
-    """
+    """An effect: its classes, a function that writes scenes, other seeds of some scenes."""
 
     name: str
     kinds: tuple[type, ...]
@@ -164,12 +148,14 @@ OVER_ANY_STEP = ub.EnergyMomentum(), ub.EnergyMomentumStatic(), ub.EnergyMomentu
 """Schemes of scenes, in turn; not all effects allow statics, or schemes with forces at the end."""
 
 
-def effect(*kinds, schemes=ANY, seeds=None):
-    """Add a function to the effects."""
+def effects(schemes=ANY, seeds=None, **kinds):
+    """Add the effects that a function of a draft and their name writes; `kinds`: their classes."""
 
     def add(function):
-        name = function.__name__
-        EFFECTS[name] = Effect(name, kinds, function, schemes, seeds or {})
+        for name, of in kinds.items():
+            write = partial(function, name=name)
+            of = of if isinstance(of, tuple) else (of,)
+            EFFECTS[name] = Effect(name, of, write, schemes, seeds or {})
         return function
 
     return add
@@ -236,30 +222,23 @@ def compute(one):
         found, acts = numbers(*draft.run()), []
         for k in range(draft.count):
             changed = numbers(*one.draft(seed, k).run())
-            same = {name: values for name, values in found.items() if name in changed}
-            other = {name: changed[name] for name in same}
-            same = {n: v for n, v in same.items() if len(v) == len(other[n])}
-            acts.append(max(differences(same, {n: other[n] for n in same}).values()))
+            same = [n for n in found if n in changed and len(found[n]) == len(changed[n])]
+            pair = ({name: of[name] for name in same} for of in (found, changed))
+            acts.append(max(differences(*pair).values()))
         scenes.append({"acts": acts, "numbers": found})
     return scenes
 
 
-def in_lines(numbers):
-    """Text of numbers in a file, with each list in one line."""
-    rows = [
-        f'  "{key}": [{", ".join(f"{x:.13g}" for x in values)}]' for key, values in numbers.items()
-    ]
-    return "{\n" + ",\n".join(rows) + "}"
-
-
 def write(name, scenes):
     """Write a file with each list of numbers in one line."""
-    lines = []
+    texts = []
     for scene in scenes:
         acts = ", ".join(f"{x:.1e}" for x in scene["acts"])
-        lines.append(f'{{"acts": [{acts}],\n "numbers": {in_lines(scene["numbers"])}}}')
+        lists = {key: ", ".join(f"{x:.13g}" for x in of) for key, of in scene["numbers"].items()}
+        lines = ",\n".join(f'  "{key}": [{values}]' for key, values in lists.items())
+        texts.append(f'{{"acts": [{acts}],\n "numbers": {{\n{lines}}}}}')
     FOLDER.mkdir(exist_ok=True)
-    (FOLDER / f"{name}.json").write_text("[" + ",\n".join(lines) + "]\n", "utf-8")
+    (FOLDER / f"{name}.json").write_text("[" + ",\n".join(texts) + "]\n", "utf-8")
 
 
 def main(names):
@@ -268,15 +247,9 @@ def main(names):
 
     missing = [name for name in EFFECTS if not (FOLDER / f"{name}.json").exists()]
     for name in names or missing:
-        try:
-            scenes = compute(EFFECTS[name])
-        except Exception as error:
-            print(name, "FAILED", repr(error)[:400], flush=True)
-            continue
+        scenes = compute(EFFECTS[name])
         write(name, scenes)
-        print(
-            name, *(f"{min(scene['acts'], default=math.nan):.1e}" for scene in scenes), flush=True
-        )
+        print(name, *(min(scene["acts"], default=math.nan) for scene in scenes), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Combinations of features agree with themselves: 24 of them, and 400 in `make verify`.
 
-``python3 tests/properties/combinations.py --from 1000 --number 500`` checks others and prints a
-table, ``--show SEED`` prints the script of one.
+``python3 test_combinations.py 1000 1500`` checks others, with one number it prints the script.
 """
 
+import sys
+import tempfile
 from pathlib import Path
 
 from mpi4py import MPI
 
+import mechanics_checks  # noqa: F401 - adds its checks
 import pytest
-from combination_table import CHECKS, outcome_of
+from combination_checks import flags_of, outcome_of
 from combinations import DYNAMICS, STATICS, Combination, draw
 from features import FEATURES
 from helpers import PUBLIC
@@ -45,96 +47,70 @@ RECORDED = {
 """What the checks `recorders` and `resumed` give to runs."""
 
 CALLED = {
-    "Checkpoint", "LoadControl", "Simulation", "buckling", "follow",
-    "linearize", "modes", "plot", "simulate",
+    "Checkpoint", "LoadControl", "Simulation", "buckling", "follow", "linearize", "modes", "plot",
+    "simulate",
 }  # fmt: skip
 """Other names that checks use."""
 
-MADE = {
-    "Connector",
-    "Joint", "Solution", "Support",
-}  # fmt: skip
+MADE = {"Connector", "Joint", "Solution", "Support"}
 """What others return; nobody makes them."""
 
 ELSEWHERE = {
-    "modules": {"distributions", "extend"},
-    "sections alike": {"box", "of_sectionproperties"},
-    "analyses of sections": {"interaction_diagram", "moment_curvature"},
-    "analyses of histories": {
-        "damping", "damping_ratio", "fit_decay", "logarithmic_decrement",
-        "peaks", "rainflow", "response_spectrum",
-    },
-    "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
-    "analyses of structures, which run several simulations": {
-        "incremental_dynamic_analysis", "load_combinations", "pushover",
-        "response_spectrum_analysis", "hinge_table", "storeys",
-    },
-    "derivatives of runs, with random combinations of their own": {"differentiate", "gradient"},
-    "many runs": {"Measurement", "calibrate", "study", "tradeoff"},
-    "other geometry of ordinary scenes": {"imperfect"},
-    "errors and words": {"ConvergenceError", "ModelWarning", "ArgumentError",
-        "ModelError", "print_once"},
-    "pictures of what is not in every combination, or of a second each": {
-        "Camera", "animate", "picture", "render",
-    },
-}  # fmt: skip
+    "modules": "distributions extend",
+    "sections alike": "box of_sectionproperties",
+    "analyses of sections": "interaction_diagram moment_curvature",
+    "analyses of histories": "damping damping_ratio fit_decay logarithmic_decrement peaks rainflow "
+    "response_spectrum",
+    "other controls of paths": "ArcLength DisplacementControl DissipationControl",
+    "analyses of structures, which run several simulations": "incremental_dynamic_analysis "
+    "load_combinations pushover response_spectrum_analysis hinge_table storeys",
+    "derivatives of runs, with random combinations of their own": "differentiate gradient",
+    "many runs": "Measurement calibrate study tradeoff",
+    "other geometry of ordinary scenes": "imperfect",
+    "errors and words": "ConvergenceError ModelWarning ArgumentError ModelError print_once",
+    "pictures of what is not in every combination, or slow": "Camera animate picture render",
+}
 """Public names that are no part of a model or its run, and why combinations leave them out."""
 
-
-KNOWN = ("passed", "not applicable", "refused")
+pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 
 
 @pytest.mark.serial
 def test_everything_public_is_drawn():
     """A new public name is drawn by a feature, used by a check, or named above with a reason."""
-    drawn = set().union(*(draw(seed).names for seed in FEW))
-    others = RECORDED | CALLED | MADE
-    others = others.union(*ELSEWHERE.values())
+    few = [draw(seed) for seed in FEW]
+    assert {one.name for c in few for one in c.features} == {one.name for one in FEATURES}
+    assert all(2 <= len(c.features) <= 5 for c in few)
+    for scheme in (*STATICS, *DYNAMICS):
+        assert any(c.has(f".{scheme}\n", f"= {scheme}\n") for c in few), scheme
+    drawn = set().union(*(c.names for c in few))
+    others = (RECORDED | CALLED | MADE).union(*(names.split() for names in ELSEWHERE.values()))
     assert not others - {*PUBLIC}, "no public names any more"
     assert not {*PUBLIC} - drawn - others, "nobody draws these"
-    models = {
-        name for name, kind in PUBLIC.items()
-        if getattr(kind, "__module__", "").startswith("ufl_beam.model.")
-    }  # fmt: skip
+    kinds = {name: getattr(kind, "__module__", "") for name, kind in PUBLIC.items()}
+    models = {name for name, module in kinds.items() if module.startswith("ufl_beam.model.")}
     assert models - MADE <= drawn, "records of models are not left out"
 
 
-@pytest.mark.serial
-def test_every_feature_and_scheme_is_drawn():
-    combinations = [draw(seed) for seed in FEW]
-    assert {one.name for c in combinations for one in c.features} == {f.name for f in FEATURES}
-    for scheme in (*STATICS, *DYNAMICS):
-        assert any(c.has(f".{scheme}\n", f"= {scheme}\n") for c in combinations), scheme
-    assert all(2 <= len(c.features) <= 5 for c in combinations)
+ALL = [pytest.param(n, marks=pytest.mark.slow, id=f"all-{n}") for n in range(NUMBER)]
 
 
 @pytest.mark.serial
-@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
-@pytest.mark.parametrize(
-    "seed",
-    [*FEW, *(pytest.param(n, marks=pytest.mark.slow, id=f"all-{n}") for n in range(NUMBER))],
-)
+@pytest.mark.parametrize("seed", [*FEW, *ALL])
 def test_all_checks_of_a_combination_pass(seed, tmp_path):
-    require_all_checks(draw(seed), tmp_path)
+    flags = flags_of(outcome_of(draw(seed), tmp_path))
+    assert not flags, f"{flags}\n{draw(seed).source}"
 
 
 @pytest.mark.serial
-@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 def test_all_checks_pass_if_iterates_go_far(tmp_path):
     """Forces of a rotating frame are 10⁷ times those in equilibrium at some iterates."""
     source = Path(__file__).with_name("far_iterates.txt").read_text(encoding="utf-8")
     features = tuple(one for one in FEATURES if one.name in source.splitlines()[0])
-    require_all_checks(Combination(157, "chain", features, source), tmp_path)
-
-
-def require_all_checks(combination, folder):
-    found = outcome_of(combination, folder, CHECKS)
-    flags = {name: words for name, words in found.items() if words not in KNOWN}
-    assert not flags, f"{flags}\n{combination.source}"
+    assert not flags_of(outcome_of(Combination(157, "chain", features, source), tmp_path))
 
 
 @pytest.mark.serial
-@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 @pytest.mark.parametrize("name", ["momentum", "jumps", "equilibrium"])
 def test_a_mistake_is_found(name, tmp_path, monkeypatch):
     """Reactions that are wrong by a part in a million are flagged in a combination of `FEW`."""
@@ -144,24 +120,27 @@ def test_a_mistake_is_found(name, tmp_path, monkeypatch):
     assert any(found.get(name, "").startswith("AssertionError") for found in outcomes)
 
 
-@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="one process")
 @pytest.mark.parametrize("seed", range(0, NUMBER, 7))
 def test_processes_agree(seed, shared_path):
-    found = outcome_of(draw(seed), shared_path, ["processes"])
-    assert set(found.values()) <= set(KNOWN), (found, draw(seed).source)
+    flags = flags_of(outcome_of(draw(seed), shared_path, ["processes"]))
+    assert not flags, f"{flags}\n{draw(seed).source}"
 
 
 @pytest.mark.slow
 @pytest.mark.serial
-@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 def test_few_combinations_are_refused_or_fail(tmp_path):
-    """In statics what breaks or flows has limit loads, beyond which there is no equilibrium.
-
-    Embedded hinges and fibres in one section, which some seeds draw, are refused.
-    """
+    """In statics there are limit loads; hinges and fibres in one section are refused."""
     found = [outcome_of(draw(seed), tmp_path, ["failed_step"]) for seed in range(NUMBER)]
-    refused = sum("run" in one for one in found)
-    failed = sum(one.get("failed_step") == "passed" for one in found)
-    assert refused <= 0.02 * NUMBER
-    assert failed <= 0.03 * NUMBER
+    assert sum("run" in one for one in found) <= 0.02 * NUMBER
+    assert sum(one.get("failed_step") == "passed" for one in found) <= 0.03 * NUMBER
+
+
+if __name__ == "__main__":
+    first, *last = map(int, sys.argv[1:])
+    if not last:
+        print(draw(first).source)
+    for number in range(first, *last) if last else ():
+        with tempfile.TemporaryDirectory() as place:
+            if found := flags_of(outcome_of(draw(number), Path(place))):
+                print(draw(number).title, found, sep="\n", flush=True)

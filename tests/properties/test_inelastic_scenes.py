@@ -1,16 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Beams that yield and break: cut in two, on several processes, in runs of two parts.
+"""Beams that yield and break: cut in two, on several processes, at rest after statics."""
 
-Other units, axes, directions and orders are those of test_random_scenes.py.
-"""
-
-from itertools import pairwise
-
-from mpi4py import MPI
+from itertools import chain, pairwise
 
 import numpy as np
 import pytest
-from scenes import rigid_chain
+from elastic_scenes import difference, in_pieces, require_same_on_processes
 
 import ufl_beam as ub
 
@@ -32,13 +27,12 @@ class Frame:
     """A frame whose column and girder yield, flow or break; its strut is elastic.
 
     Args:
-        kind: One of KINDS.
         cut: Beams that are stated as two.
         viscous: Whether what flows also creeps.
         size: Of the displacement that drives the frame; m.
     """
 
-    def __init__(self, kind, *, cut=(), viscous=True, size=0.25):
+    def __init__(self, kind, *, cut=(), viscous=True, size=0.25, strut_first=False):
         self._viscous, self._hinged = viscous, kind not in ("fibres", "cracks")
         self._beams, joints = {}, []
         for i, (start, end) in enumerate(pairwise(CORNERS)):
@@ -64,7 +58,7 @@ class Frame:
             top, u=lambda t: size * growing(t), v=lambda t: -((size * growing(t)) ** 2) / 2
         )
         self.scene = ub.Scene(
-            [piece for pieces in self._beams.values() for piece in pieces],
+            [*chain(*self._beams.values())][:: -1 if strut_first else 1],
             joints=joints,
             supports=[ub.Clamped(self.place((0, 0.0))), ub.Pinned(self.place((2, 1.0))), drive],
             loads=[ub.PointLoad(middle, force=(5.0, -20.0), amplitude=growing)],
@@ -72,29 +66,22 @@ class Frame:
         )
 
     def _section(self, kind, i):
+        viscous = self._viscous
         if kind in ("fibres", "cracks") and i < 2:
-            law = ub.ElastoPlastic(2.5e5, 1e6, 2e6, ub.Perzyna(1e4 * self._viscous))
-            breaks = ub.Softening(3e5, 3e4) if kind == "cracks" else None
-            return ub.Section.of_fibres(
-                np.array([-0.05, -0.02, 0.01, 0.06]), np.full(4, 2e-4), E=5e7, nu=0.2, rho=1e3,
-                fibres=ub.Fibres(law, softening=breaks),
-            )  # fmt: skip
+            law = ub.ElastoPlastic(2.5e5, 1e6, 2e6, ub.Perzyna(1e4 * viscous))
+            fibres = ub.Fibres(law, softening=ub.Softening(3e5, 3e4) if kind == "cracks" else None)
+            y, A = np.array([-0.05, -0.02, 0.01, 0.06]), np.full(4, 2e-4)
+            return ub.Section.of_fibres(y, A, E=5e7, nu=0.2, rho=1e3, fibres=fibres)
         laws = {}
         if kind == "resultants" and i < 2:
-            laws["axial"] = ub.ElastoPlastic(
-                30.0, 500.0, viscosity=ub.Perzyna(20.0 * self._viscous)
-            )
-            laws["bending"] = ub.ElastoPlastic(5.0, 5.0, 4.0, ub.DuvautLions(0.02 * self._viscous))
+            laws["axial"] = ub.ElastoPlastic(30.0, 500.0, viscosity=ub.Perzyna(20.0 * viscous))
+            laws["bending"] = ub.ElastoPlastic(5.0, 5.0, 4.0, ub.DuvautLions(0.02 * viscous))
         if kind == "hinges" and i == 0:
             laws["bending"], laws["hinge"] = ub.ElastoPlastic(5.0, 9.0), ub.Softening(8.0, 10.0)
         return ub.Section(EA=1e4, GA=1e4, EI=60.0, rhoA=1.0, rhoI=0.01, **laws)
 
     def place(self, place):
-        i, s = place
-        pieces = self._beams[i]
-        if len(pieces) == 1:
-            return pieces[0].at(s)
-        return pieces[0].at(2 * s) if s <= 0.5 else pieces[1].at(2 * s - 1)
+        return in_pieces(self._beams[place[0]], place[1])
 
     def run(self, scheme, *, steps=15, **more):
         self.solution = ub.simulate(self.scene, scheme, t=(0, 1.0), dt=1.0 / steps, **more)
@@ -109,23 +96,16 @@ class Frame:
         forces, jump, plastic, hinge = (np.concatenate(x) for x in zip(*parts, strict=True))
         return [*forces.T, jump * self._hinged, plastic, hinge]
 
+    def results(self):
+        return [self.motion(), *self.material()]
+
     def energies(self):
         energy = self.solution.energy
         return {**energy.state, **energy.supplied, **energy.lost}
 
-
-def difference(one, other):
-    """Largest difference of two results, each kind as a part of its largest value."""
-    pairs = [(one.motion(), other.motion()), *zip(one.material(), other.material(), strict=True)]
-    first, second = one.energies(), other.energies()
-    assert first.keys() == second.keys()
-    throughput = one.solution.energy.energy_transferred
-    parts = [np.abs(first[n] - second[n]).max() / throughput for n in first]
-    for a, b in pairs:
-        assert a.shape == b.shape
-        largest = np.abs(a).max()
-        parts.append(np.abs(a - b).max() / largest if largest else np.abs(b).max())
-    return float(max(parts))
+    @property
+    def throughput(self):
+        return self.solution.energy.energy_transferred
 
 
 each_kind = pytest.mark.parametrize("kind", KINDS)
@@ -137,7 +117,7 @@ each_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_a_good_part_of_the_energy_is_dissipated(kind, scheme):
     """The tests below would show little of scenes that hardly yield and break."""
     frame = Frame(kind).run(scheme)
-    energies, throughput = frame.energies(), frame.solution.energy.energy_transferred
+    energies, throughput = frame.energies(), frame.throughput
     assert energies["plastic"][-1] > 1e-2 * throughput
     assert ("hinges" in energies) == (kind in ("hinges", "cracks"))
     if "hinges" in energies:
@@ -146,8 +126,7 @@ def test_a_good_part_of_the_energy_is_dissipated(kind, scheme):
         *_, jump, _, hinge = frame.material()
         assert (jump != 0).sum() >= 2
         assert ((hinge > 0) == (jump != 0)).all()
-    if scheme != ub.Static():
-        # Exact by design, section 9
+    if scheme != ub.Static():  # exact by design, section 9
         assert frame.solution.energy.worst < 1e-9
 
 
@@ -162,75 +141,14 @@ def test_a_beam_cut_in_two_is_the_same_beam(kind, scheme):
 
 @each_kind
 @each_scheme
-def test_processes_find_the_result_of_one(kind, scheme):
-    """The number of processes: against each process alone.  On one rank: a run can be repeated.
+@pytest.mark.parametrize("strut_first", [True, False])
+def test_processes_find_the_result_of_one(kind, scheme, strut_first):
+    """On three ranks the first or the last one has the strut, and nothing that yields."""
 
-    The strut is elastic, and of three beams of four cells it is the last: on three ranks one has
-    nothing that yields.
-    """
-    one, other = Frame(kind).run(scheme), Frame(kind).run(scheme, comm=MPI.COMM_SELF)
-    assert difference(one, other) < SAME
-    everywhere = MPI.COMM_WORLD.allgather(one.motion().tobytes())
-    assert len(set(everywhere)) == 1
-    if MPI.COMM_WORLD.size == 1:
-        assert (one.motion() == other.motion()).all()
+    def run(comm):
+        return Frame(kind, strut_first=strut_first).run(scheme, comm=comm)
 
-
-@each_scheme
-@pytest.mark.parametrize("first", [True, False])
-def test_some_processes_have_no_hinges(scheme, first):
-    """Half of the cells yield and break, those of the first ranks or of the last ones."""
-    plain = {"EA": 1e4, "GA": 1e4, "EI": 60.0, "rhoA": 1.0}
-    laws = {"bending": ub.ElastoPlastic(6.0, 9.0), "hinge": ub.Softening(8.0, 10.0)}
-    sections = [ub.Section(**plain, **laws), ub.Section(**plain)][:: 1 if first else -1]
-    a = ub.Beam((0, 0), (1, 0), sections[0], cells=6, name="a")
-    b = ub.Beam((1, 0), (2, 0), sections[1], cells=6, name="b")
-    tip = ub.PrescribedDisplacement(b.end, v=ub.Table([0, 1], [0, 0.6]))
-    scene = rigid_chain([a, b], supports=[ub.Clamped(a.start), tip])
-    one, other = (
-        ub.simulate(scene, scheme, t=(0, 1), dt=0.05, comm=comm)
-        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
-    )
-    for beam in (a, b):
-        for values, expected in zip(one.material(beam), other.material(beam), strict=True):
-            scale = np.abs(expected).max()
-            assert np.abs(values - expected).max() <= SAME * scale
-    for name in ("plastic", "hinges", "stored", "supports"):
-        assert one.energy[name] == pytest.approx(other.energy[name], rel=1e-8, abs=1e-9)
-    assert one.energy["plastic"][-1] > 0
-    if first:
-        assert one.energy["hinges"][-1] > 0
-
-
-# -- a run goes on ---------------------------------------------------------------------------------
-
-
-@each_kind
-@each_scheme
-def test_a_run_in_two_parts_is_the_run(kind, scheme):
-    """Configuration, velocities and internal variables are all that a run needs.
-
-    The second part unloads, so that a first step that is cut does not lead elsewhere.
-    """
-    whole, part = (Frame(kind, size=0.12, viscous=False) for _ in range(2))
-    whole.run(scheme, steps=100)
-    first = ub.simulate(part.scene, scheme, t=(0, 0.7), dt=0.01, every=9)
-    second = ub.simulate(part.scene, scheme, t=(0.7, 1), dt=0.01, start=first)
-    beam = part.scene.beams[0]
-    # The state that begins the second part is that which ended the first, to the last digit
-    for one, two in zip(first.material(beam), second.material(beam, 0), strict=True):
-        assert np.abs(one - two).max() <= 1e-14 * np.abs(one).max()
-    assert (second.q[0] == first.q[-1]).all()
-    for name in first.energy.state:
-        assert second.energy[name][0] == pytest.approx(first.energy[name][-1], rel=1e-13)
-    part.solution = second
-    motion, expected = part.motion()[:, :, -1], whole.motion()[:, :, -1]
-    assert np.abs(motion - expected).max() < SAME * np.abs(expected).max()
-    for values, scale in zip(part.material(), whole.material(), strict=True):
-        assert np.abs(values - scale).max() <= SAME * np.abs(scale).max()
-    for name in {"plastic", "hinges"} & set(whole.solution.energy.lost):
-        lost = first.energy[name][-1] + second.energy[name][-1]
-        assert lost == pytest.approx(whole.solution.energy[name][-1], rel=1e-7)
+    require_same_on_processes(run, SAME)
 
 
 @each_kind

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: MIT
 """One elastic scene stated in two ways gives one result: units, axes, cuts, processes."""
 
+from dataclasses import replace
+
 from mpi4py import MPI
 
 import numpy as np
 import pytest
-from elastic_scenes import DRAWS, Built, Units, difference, draw
+from elastic_scenes import DRAWS, Built, difference, draw, require_same_on_processes
+from scene_statements import AS_GIVEN, Statement
 
 import ufl_beam as ub
 
@@ -17,28 +20,39 @@ SCHEMES = [ub.EnergyMomentum(), ub.EnergyMomentum(0.05, 0.05)]
 SCHEME = SCHEMES[1]
 """The one with all terms."""
 
-pytestmark = pytest.mark.parametrize("seed", DRAWS)
+each_draw = pytest.mark.parametrize("seed", DRAWS)
 
 
+def in_units(seed):
+    """A statement in random units."""
+    metre, kilogram, second = 10 ** np.random.default_rng(seed).uniform(-4, 4, 3)
+    return Statement(units=(float(kilogram), float(metre), float(second)))
+
+
+def turned(seed):
+    """A statement in random axes."""
+    return Statement(angle=float(np.random.default_rng(seed).uniform(-np.pi, np.pi)))
+
+
+def static(seed, statement=AS_GIVEN, *, cut=(), **more):
+    """A static run of a scene that cannot move without strain."""
+    built = Built(draw(seed, fixed=True), statement, cut=cut)
+    return built.run(ub.Static(), steps=5, step=0.1, **more)
+
+
+@each_draw
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_results_do_not_depend_on_units(seed, scheme):
     """No number in the package has a dimension."""
-    numbers = draw(seed)
-    random = np.random.default_rng(1000 + seed)
-    units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
-    one, other = Built(numbers).run(scheme), Built(numbers, units=units).run(scheme)
+    one, other = (Built(draw(seed), x).run(scheme) for x in (AS_GIVEN, in_units(1000 + seed)))
     assert difference(one, other) < SAME
     assert one.solution.iterations == other.solution.iterations
     assert one.solution.substeps == other.solution.substeps
 
 
+@each_draw
 def test_static_results_do_not_depend_on_units(seed):
-    numbers = draw(seed, fixed=True)
-    random = np.random.default_rng(2000 + seed)
-    units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
-    one, other = (
-        Built(numbers, units=u).run(ub.Static(), steps=5, step=0.1) for u in (Units(), units)
-    )
+    one, other = static(seed), static(seed, in_units(2000 + seed))
     assert difference(one, other) < SAME
     assert one.solution.substeps == other.solution.substeps
     if one.solution.substeps <= 6:  # else iterations wandered before a step was cut
@@ -47,88 +61,57 @@ def test_static_results_do_not_depend_on_units(seed):
         assert abs(one.solution.iterations - other.solution.iterations) <= 1
 
 
+@each_draw
 def test_results_turn_with_the_axes(seed):
     """Objectivity: the whole scene turned by any angle."""
-    numbers = draw(seed)
-    angle = float(np.random.default_rng(3000 + seed).uniform(-np.pi, np.pi))
-    one, other = Built(numbers).run(SCHEME), Built(numbers, angle=angle).run(SCHEME)
+    one, other = (Built(draw(seed), x).run(SCHEME) for x in (AS_GIVEN, turned(3000 + seed)))
     assert difference(one, other) < SAME
+    assert np.abs(one.motion()).max() > 1e-3  # no trivial scene: of its size, or rad
+    assert difference(static(seed), static(seed, turned(4000 + seed))) < SAME
 
 
-def test_static_results_turn_with_the_axes(seed):
-    numbers = draw(seed, fixed=True)
-    angle = float(np.random.default_rng(4000 + seed).uniform(-np.pi, np.pi))
-    one, other = (Built(numbers, angle=a).run(ub.Static(), steps=5, step=0.1) for a in (0.0, angle))
-    assert difference(one, other) < SAME
-
-
+@each_draw
 def test_a_beam_cut_in_two_is_the_same_beam(seed):
     """A beam cut in two by a rigid joint is the same beam."""
-    numbers = draw(seed)
-    one = Built(numbers).run(SCHEME)
-    other = Built(numbers, cut=range(len(numbers.beams))).run(SCHEME)
+    one, other = (Built(draw(seed), cut=cut).run(SCHEME) for cut in ((), range(4)))
     assert len(other.scene.beams) == 2 * len(one.scene.beams)
     assert other.solution.numbering.size == one.solution.numbering.size
     assert difference(one, other) < SAME
+    assert difference(static(seed), static(seed, cut=[0])) < SAME
 
 
-def test_in_statics_a_beam_cut_in_two_is_the_same_beam(seed):
-    numbers = draw(seed, fixed=True)
-    one = Built(numbers).run(ub.Static(), steps=5, step=0.1)
-    other = Built(numbers, cut=[0]).run(ub.Static(), steps=5, step=0.1)
-    assert difference(one, other) < SAME
-
-
-def test_processes_find_the_result_of_one(seed):
+@each_draw
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_processes_find_the_result_of_one(seed, scheme):
     """The number of processes: against each process alone.  On one rank: a run can be repeated."""
-    numbers = draw(seed)
-    for scheme in SCHEMES:
-        one = Built(numbers).run(scheme)
-        other = Built(numbers).run(scheme, comm=MPI.COMM_SELF)
-        assert difference(one, other) < SAME
-        # On all ranks alike
-        everywhere = MPI.COMM_WORLD.allgather(one.motion().tobytes())
-        assert len(set(everywhere)) == 1
-        if MPI.COMM_WORLD.size == 1:
-            assert (one.motion() == other.motion()).all()
+    require_same_on_processes(lambda comm: Built(draw(seed)).run(scheme, comm=comm), SAME)
+    assert difference(static(seed), static(seed, comm=MPI.COMM_SELF)) < SAME
 
 
-def test_in_statics_processes_find_the_result_of_one(seed):
-    numbers = draw(seed, fixed=True)
-    one, other = (
-        Built(numbers).run(ub.Static(), steps=5, step=0.1, comm=comm)
-        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
-    )
-    assert difference(one, other) < SAME
-
-
-def test_scenes_move_by_a_part_of_their_size(seed):
-    """The scenes are no trivial ones: they move by a good part of their size, and turn."""
-    motion = Built(draw(seed)).run(ub.EnergyMomentum()).motion()
-    assert np.abs(motion).max() > 1e-3
-
-
-def run_adaptive(built, **more):
-    built.solution = ub.simulate(
-        built.scene, SCHEME, t=(0.0, 0.3 * built.units.second), dt=ub.Adaptive(1e-4), **more
-    )
-    return built
-
-
+@each_draw
 def test_adaptive_steps_do_not_depend_on_the_statement(seed):
-    """The steps themselves, in other units, turned, on other numbers of processes.
+    """The steps themselves, by differences of accelerations, which have a few digits less."""
 
-    Their lengths come from differences of accelerations, which have a few digits less.
-    """
-    numbers = draw(seed)
-    random = np.random.default_rng(6000 + seed)
-    units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
-    one = run_adaptive(Built(numbers))
-    for other in (
-        run_adaptive(Built(numbers, units=units)),
-        run_adaptive(Built(numbers, angle=1.0)),
-        run_adaptive(Built(numbers), comm=MPI.COMM_SELF),
-    ):
-        times = other.solution.times / other.units.second
+    def run(statement=AS_GIVEN, **more):
+        return Built(draw(seed), statement).run(SCHEME, adaptive=ub.Adaptive(1e-4), **more)
+
+    one, axes = run(), Statement(angle=1.0)
+    for other in (run(in_units(6000 + seed)), run(axes), run(comm=MPI.COMM_SELF)):
+        times = other.solution.times / other.statement.unit("s")
         np.testing.assert_allclose(times, one.solution.times, rtol=1e-6)
         assert difference(one, other) < 1e-6
+
+
+@pytest.mark.parametrize("damping", [(), (ub.Rayleigh(mass=0.3, stiffness=1e-3),)])
+@pytest.mark.parametrize("seed", range(0, 36, 3))
+def test_modes_do_not_depend_on_units_and_axes(seed, damping):
+    """Tolerance: round-off 1e-16 times the ratio of the highest squared frequency to the lowest."""
+
+    def exponents(statement):
+        scene = Built(draw(seed, free=seed % 2 == 0), statement).scene
+        return ub.modes(replace(scene, damping=damping), 8).exponents
+
+    plain = exponents(AS_GIVEN)
+    assert len(plain) == 8
+    for way in (Statement(angle=0.7), Statement(units=(10.0, 1e3, 1.0))):
+        np.testing.assert_allclose(exponents(way), plain, rtol=1e-8, atol=1e-12)

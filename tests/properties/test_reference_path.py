@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Random scenes: results of the reference solver, and tangents against differences.
 
-The reference solver shares with a run the records of a scene, the numbering, the time schemes, and
-what states the mechanics.  The equation of a step, its solution, the return map and the ledger are
-written twice.  In scenes beyond its scope, results are those of version 0.1.0, which are stored.
+The reference solver shares records, numbering, time schemes and mechanics with a run.  In scenes
+beyond its scope, results are those of version 0.1.0, which are stored.
 """
+
+from functools import partial
 
 from mpi4py import MPI
 
@@ -12,17 +13,17 @@ import numpy as np
 import pytest
 import random_machines
 import random_scenes
+from helpers import raises
+from scene_statements import made
 from scenes import clamped
+from stored_scenes import differences, numbers
 
 import ufl_beam as ub
 
 SCENES = [20, 199, 240, 367]
 MACHINES = [0, 6, 10, 14, 17, 23, 27, 38, 65, 70, 72, 76, 82, 84, 85, 104, 111, 116, 117]
-"""Random scenes and machines up to 400 and 120 in the scope of the reference solver.
-
-Three machines are left out: Newton's method wanders in their steps, so that round-off decides where
-a step is cut.
-"""
+"""Random scenes and machines in the scope of the reference solver, without three in which Newton's
+method wanders, so that round-off decides where a step is cut."""
 
 MANY = [
     *(6, 11, 12, 13, 16, 18, 27, 29, 31, 33, 34, 44, 46, 51, 53, 56, 61, 67, 68, 81, 82, 91, 93),
@@ -31,14 +32,8 @@ MANY = [
 """Random scenes that have, between them, every object, law and scheme of `random_scenes`."""
 
 SAME = 1e-9
-"""Difference as a part of the largest motion or force, or of the energy that went through.
-
-Newton's method stops at 1e-12 of the forces; conditions of the scenes magnify that up to a thousand
-times in 15 steps.
-"""
-
-COLUMNS = "motion", "force", "work", "rate", "dissipated"
-"""Of the history of a connector; forces are in the configuration."""
+"""Difference as a part of the largest motion, force or energy: Newton's method stops at 1e-12 of
+the forces, which conditions of the scenes magnify up to a thousand times in 15 steps."""
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning"),
@@ -46,17 +41,16 @@ pytestmark = [
 ]
 
 
-def made(source, steps):
-    """Scene, scheme, times, length of equal steps and mesh that a script makes."""
-    names = {}
-    exec(source, names)
+def case(of, seed):
+    """Scene, scheme, times, length of equal steps and mesh of a random scene or machine."""
+    names, steps = made(of.script(seed)), of.STEPS
     times = names.get("times") or (0.0, steps * names["dt"])
     return names["scene"], names["scheme"], times, (times[1] - times[0]) / steps, names.get("mesh")
 
 
-def run(case, *, reference):
+def run(one, *, reference):
     """The solution of a scene, as far as it goes."""
-    scene, scheme, times, dt, mesh = case
+    scene, scheme, times, dt, mesh = one
     newton = ub.Newton(rtol=1e-12, reference=reference)
     try:
         return ub.simulate(scene, scheme, t=times, dt=dt, mesh=mesh, newton=newton)
@@ -64,98 +58,52 @@ def run(case, *, reference):
         return error.solution
 
 
-def difference(a, b):
-    """Largest difference, as a part of the largest size; what is no number is in both."""
-    a, b = np.asarray(a), np.asarray(b)
-    assert a.shape == b.shape
-    assert np.array_equal(np.isnan(a), np.isnan(b))
-    size = np.abs(np.nan_to_num(b)).max(initial=0.0)
-    return np.abs(np.nan_to_num(a - b)).max(initial=0.0) / (size or 1.0)
-
-
-def differences(found, reference):
-    """Largest differences of all kinds of results, by name."""
-    if len(found) != len(reference):
-        return {"number of steps": np.inf}
-    scene, through = reference.scene, reference.energy.energy_transferred or 1.0
-    every = {"times": (found.times, reference.times), "q": (found.q, reference.q)}
-    every["velocities"] = found.v, reference.v
-    mine, others = (_forces(solution) for solution in (found, reference))
-    for name, part in (("forces", slice(0, 2)), ("moments", slice(2, 3))):
-        every[name] = mine[..., part], others[..., part]
-    of = {name: difference(*pair) for name, pair in every.items()}
-    for kind in ("state", "supplied", "lost"):
-        mine, others = getattr(found.energy, kind), getattr(reference.energy, kind)
-        assert set(mine) == set(others)
-        for name in mine:
-            of[name] = np.abs(mine[name] - others[name]).max() / through
-    for connector in scene.all_connectors:
-        size = 1.0 if connector.is_rotation else scene.size
-        pairs = [*zip(found.connector(connector), reference.connector(connector), strict=True)]
-        sizes = size, np.inf, through, size / (found.times[-1] - found.times[0]), through
-        for name, pair, of_size in zip(COLUMNS, pairs, sizes, strict=True):
-            of[f"{name} of {connector}"] = np.abs(np.nan_to_num(pair[0] - pair[1])).max() / of_size
-    return of
-
-
-def _forces(solution):
-    """Reactions, and forces and moments in two cells of each beam, at all times."""
-    scene = solution.scene
-    reactions = [solution.reaction(support) for support in scene.supports]
-    places = [beam.at(s) for beam in scene.beams for s in (0.3, 0.8)]
-    return np.array([*reactions, *(solution.section_forces_at(place) for place in places)])
-
-
-def require_same(case):
-    found = differences(run(case, reference=False), run(case, reference=True))
+def require_same(one):
+    """All states have the motions, forces and energies of the reference solver."""
+    solutions = [run(one, reference=reference) for reference in (False, True)]
+    assert len(solutions[0]) == len(solutions[1])
+    rows = range(1, len(solutions[0]))
+    mine, others = (dict(sorted(numbers(one[0], x, rows).items())) for x in solutions)
+    found = differences(mine, others)
     assert max(found.values()) < SAME, {k: v for k, v in found.items() if not v < SAME}
 
 
 @pytest.mark.parametrize("seed", SCENES)
 def test_random_scenes_have_the_results_of_the_reference(seed):
-    require_same(made(random_scenes.script(seed), random_scenes.STEPS))
+    require_same(case(random_scenes, seed))
 
 
 @pytest.mark.parametrize("seed", MACHINES)
 def test_random_machines_have_the_results_of_the_reference(seed):
-    require_same(made(random_machines.script(seed), random_machines.STEPS))
+    require_same(case(random_machines, seed))
 
 
 @pytest.mark.parametrize("seed", MANY)
 def test_random_scenes_have_stored_results(seed, as_by_reference):
-    case = made(random_scenes.script(seed), random_scenes.STEPS)
-    as_by_reference(run(case, reference=False), SAME)
+    as_by_reference(run(case(random_scenes, seed), reference=False), SAME)
 
 
 @pytest.mark.parametrize("seed", [8, 11, 15, 28, 29, 31, 33, 34])
 def test_random_machines_have_stored_results(seed, as_by_reference):
-    case = made(random_machines.script(seed), random_machines.STEPS)
-    as_by_reference(run(case, reference=False), SAME)
-
-
-# -- tangents --------------------------------------------------------------------------------------
-
-
-def names(seeds):
-    """All names of the package in random scenes."""
-    words = " ".join(random_scenes.script(seed) for seed in seeds).split("ub.")[1:]
-    return {word.split("(")[0] for word in words}
+    as_by_reference(run(case(random_machines, seed), reference=False), SAME)
 
 
 def test_the_scenes_have_everything():
-    """The seeds above leave out nothing that hundreds of scenes have."""
-    assert names(MANY) == names(range(200))
+    """The seeds above leave out no name of the package that hundreds of scenes have."""
+    many, all_of_them = (
+        {word.split("(")[0] for n in seeds for word in random_scenes.script(n).split("ub.")[1:]}
+        for seeds in (MANY, range(200))
+    )
+    assert many == all_of_them
 
 
 @pytest.mark.parametrize("seed", MANY)
 def test_tangents(seed):
     """Off equilibrium, after a step, the tangent is the derivative of the forces by all unknowns.
 
-    The change of an unknown that suits most entries is too long where laws have corners or gaps are
-    short, and too short where parts are 1e6 times as stiff as others; each entry has the best of
-    four.
+    Changes are too long at corners of laws or too short in stiff parts: the best of four counts.
     """
-    scene, scheme, (t0, _), dt, mesh = made(random_scenes.script(seed), random_scenes.STEPS)
+    scene, scheme, (t0, _), dt, mesh = case(random_scenes, seed)
     newton = ub.Newton(rtol=1e-12)
     simulation = ub.Simulation(scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF)
     equation, supports, numbering = simulation.equation, simulation.supports, simulation.numbering
@@ -191,33 +139,6 @@ def test_tangents(seed):
     assert (worst / np.abs(K).max(axis=1, keepdims=True)).max() < 1e-6
 
 
-# -- start and refusals ----------------------------------------------------------------------------
-
-
-def test_what_it_does_not_compute():
-    scene, newton = softening(), ub.Newton(reference=True)
-    times = {"t": (0, 0.1), "newton": newton}
-    calls = {
-        "adaptive steps": lambda: ub.simulate(
-            scene, ub.EnergyMomentum(), dt=ub.Adaptive(1e-3), **times
-        ),
-        "checkpoint": lambda: ub.simulate(
-            scene,
-            ub.EnergyMomentum(),
-            dt=0.01,
-            checkpoint=ub.Checkpoint("run.h5", every=5),
-            **times,
-        ),
-        "Simulation": lambda: ub.Simulation(scene, ub.EnergyMomentum(), newton=newton),
-        "follow": lambda: ub.follow(scene, ub.LoadControl(0.1), steps=1, newton=newton),
-    }
-    for what, call in calls.items():
-        with pytest.raises(
-            ub.ArgumentError, match=f"reference=True cannot be combined with {what}"
-        ):
-            call()
-
-
 def softening():
     """A column whose cells may open, under a growing force at its top."""
     section = ub.Section(EA=1e6, GA=4e5, EI=800.0, hinge=ub.Softening(40.0, fracture_energy=15.0))
@@ -226,9 +147,25 @@ def softening():
     return clamped(beam, loads=[push])
 
 
+REFERENCE, CHECKPOINT = {"newton": ub.Newton(reference=True)}, ub.Checkpoint("run.h5", every=5)
+
+
+@pytest.mark.parametrize(
+    ("words", "call"),
+    [
+        ("adaptive steps", partial(ub.simulate, t=(0, 0.1), dt=ub.Adaptive(1e-3))),
+        ("checkpoint", partial(ub.simulate, t=(0, 0.1), dt=0.01, checkpoint=CHECKPOINT)),
+        ("Simulation", ub.Simulation),
+        ("follow", lambda scene, _, **more: ub.follow(scene, ub.LoadControl(0.1), steps=1, **more)),
+    ],
+)
+def test_what_it_does_not_compute(words, call):
+    with raises("reference=True cannot be combined with", words):
+        call(softening(), ub.EnergyMomentum(), **REFERENCE)
+
+
 def test_a_step_without_equilibrium():
     """The solution so far comes with the error, as that of a run does."""
-    newton = ub.Newton(reference=True)
-    with pytest.raises(ub.ConvergenceError, match="no equilibrium after t = 0") as failure:
-        ub.simulate(softening(), ub.Static(), t=(0, 1), dt=0.1, newton=newton)
+    with raises("no equilibrium after t = 0", kind=ub.ConvergenceError) as failure:
+        ub.simulate(softening(), ub.Static(), t=(0, 1), dt=0.1, **REFERENCE)
     assert 0.39 < failure.value.solution.times[-1] <= 0.48 + 1e-9  # 40 N m over 1 m to 5/6 m

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A run that is stopped, by whatever, and run again is the run, to the last bit."""
 
+import contextlib
 import os
 import random
 import signal
@@ -13,9 +14,9 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from helpers import stop_after
-from restart_scenes import arrays_of, bend, machine, run
-from time_series import read_vtkhdf, read_xdmf
+from helpers import raises, stop_after
+from restart_scenes import arrays_of, bend, machine
+from time_series import read_vtkhdf, require_equal
 
 import ufl_beam as ub
 
@@ -102,89 +103,47 @@ def test_a_run_goes_on_on_another_number_of_processes(kind, first, shared_path, 
     assert_same_numbers(solution, arrays_of(whole))
 
 
-def test_a_finished_run_is_there_at_once(shared_path):
-    path = shared_path / "run.checkpoint"
-    whole = go("midpoint", path)
-    again = go("midpoint", path, steps=1)  # a single step would stop it
-    assert_same_numbers(arrays_of(again), arrays_of(whole))
-    assert again.q.tobytes() == whole.q.tobytes()
-
-
-def test_a_later_end_goes_on(shared_path):
+def test_a_finished_run_is_there_at_once_and_a_later_end_goes_on(shared_path):
     """The rounding of the times of steps is another; all else is the run."""
-    scene, path = machine(), shared_path / "run.checkpoint"
+    checkpoint = ub.Checkpoint(shared_path / "run.checkpoint", every=100)
 
-    def until(end, **more):
-        scheme = ub.EnergyMomentum(0.05)
-        return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, **more)
+    def until(end, steps=10**9, **more):
+        more |= {"t": (0, end), "dt": 0.005, "record": stop_after(steps)}
+        return ub.simulate(machine(), ub.EnergyMomentum(0.05), **more)
 
-    checkpoint = ub.Checkpoint(path, every=100)
-    until(0.1, checkpoint=checkpoint)
+    short = until(0.1, checkpoint=checkpoint)
+    again = until(0.1, steps=1, checkpoint=checkpoint)  # a single step would stop it
+    assert_same_numbers(arrays_of(again), arrays_of(short))
+    assert again.q.tobytes() == short.q.tobytes()
     longer, whole = until(0.2, checkpoint=checkpoint), until(0.2)
     assert longer.times == pytest.approx(whole.times, rel=1e-14)
     # What a last digit of the time changes, and what Newton's method leaves
     assert np.abs(longer.q - whole.q).max() < 1e-8 * np.abs(whole.q).max()
-    with pytest.raises(ub.ArgumentError, match=r"is at t = 0.2 s, beyond the end t\[1\] = 0.15"):
+    with raises("is at t = 0.2 s, beyond the end t[1] = 0.15"):
         until(0.15, checkpoint=checkpoint)
-    assert scene.size > 1
-
-
-def assert_same_files(one, other):
-    for name in ("run.csv", "few.csv", "run.xdmf"):
-        assert (one / name).read_bytes() == (other / name).read_bytes(), name
-    found, expected = (read_vtkhdf(folder / "run.vtkhdf") for folder in (one, other))
-    assert found.times == expected.times
-    assert_same_bits(*({n: s.of(n) for n in s.names} for s in (found, expected)))
-
-
-@pytest.mark.serial
-def test_files_go_on(tmp_path):
-    """Tables and XDMF byte for byte; VTKHDF, whose HDF5 leaves gaps, number by number."""
-    whole, parts = tmp_path / "whole", tmp_path / "parts"
-    for folder in (whole, parts):
-        folder.mkdir()
-    run(whole, steps=40, every=7, record=[stop_after(10**9)])
-    for steps in (11, 15, 8):
-        with pytest.raises(KeyboardInterrupt):
-            run(parts, steps=40, every=7, record=[stop_after(steps)])
-    run(parts, steps=40, every=7, record=[stop_after(10**9)])
-    assert_same_files(whole, parts)
-    assert len(read_xdmf(parts / "run.xdmf").times) == 6
-
-
-# -- kill -9 ---------------------------------------------------------------------------------------
-
-
-def size_of(file):
-    """Bytes; none of one that is not there, as when a run tries whether it can be written."""
-    try:
-        return file.stat().st_size
-    except FileNotFoundError:
-        return 0
 
 
 def until_killed(folder, dice):
-    """Run the script and kill it some rows later, at any moment; whether it was still running."""
-    table = folder / "run.csv"
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    """Run the script and kill it a moment after it has gone on; whether it was still running."""
+
+    def size():
+        with contextlib.suppress(FileNotFoundError):  # not yet, or being replaced
+            return (folder / "run.csv").stat().st_size
+
+    environment, before = {**os.environ, "OMP_NUM_THREADS": "1"}, size()
     process = subprocess.Popen([sys.executable, str(SCRIPT), str(folder)], env=environment)
-    before = size_of(table)
-    more = dice.randrange(200, 2500)  # bytes; a row has some 700
-    if dice.random() < 0.1:
-        time.sleep(dice.uniform(0, 1.5))  # while it begins
-    else:
-        while process.poll() is None and size_of(table) in (before, 0):
-            time.sleep(0.002)
-        begin = size_of(table)
-        while process.poll() is None and size_of(table) < begin + more:
-            time.sleep(0.0005)
-        time.sleep(dice.uniform(0, 0.02))
+    while process.poll() is None and size() in (before, None, 0):
+        time.sleep(0.002)
+    time.sleep(dice.uniform(0, 0.05))
     process.send_signal(signal.SIGKILL)
     return process.wait() == -signal.SIGKILL
 
 
-def require_killed_runs_are_the_run(folder, kills):
-    whole, killed = folder / "whole", folder / "killed"
+@pytest.mark.serial
+@pytest.mark.parametrize("kills", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_killed_runs_are_the_run(tmp_path, kills):
+    """Tables and XDMF byte for byte; VTKHDF, whose HDF5 leaves gaps, number by number."""
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
     for one in (whole, killed):
         one.mkdir()
     dice = random.Random(1)
@@ -194,16 +153,7 @@ def require_killed_runs_are_the_run(folder, kills):
     assert done >= kills / 2  # the others had come to the end
     with np.load(whole / "end.npz") as one, np.load(killed / "end.npz") as other:
         assert_same_bits({n: one[n] for n in one}, {n: other[n] for n in other})
-    assert_same_files(whole, killed)
+    for name in ("run.csv", "few.csv", "run.xdmf"):
+        assert (whole / name).read_bytes() == (killed / name).read_bytes(), name
+    require_equal(*(read_vtkhdf(folder / "run.vtkhdf") for folder in (killed, whole)))
     assert not list(killed.glob("*.part"))
-
-
-@pytest.mark.serial
-def test_killed_twice(tmp_path):
-    require_killed_runs_are_the_run(tmp_path, 2)
-
-
-@pytest.mark.slow
-@pytest.mark.serial
-def test_killed_twenty_times(tmp_path):
-    require_killed_runs_are_the_run(tmp_path, 20)

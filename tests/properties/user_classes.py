@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions and classes of a user: works, laws, a scheme and a recorder, as docs/ show them.
-
-They are the same objects in all scenes, with other numbers each, so that each is compiled once.
-"""
+"""Functions and classes of a user, as in docs/; the same objects in all scenes, compiled once."""
 
 import sys
 from dataclasses import dataclass
@@ -15,15 +12,7 @@ import ufl
 import ufl_beam as ub
 
 sys.path.append(str(Path(__file__).parents[1]))
-from user_laws import (  # noqa: F401
-    AirDrag,
-    Dashpot,
-    HardeningSpring,
-    MaxwellElement,
-    Petersson,
-    PowerLaw,
-    Rising,
-)
+from user_laws import *  # noqa: F403 - other laws have names of their own
 
 f = ub.extend.law_functions
 
@@ -203,11 +192,7 @@ class Weighted(ub.extend.EnergyMomentumBase, ub.extend.MidpointDynamics):
             inertia=(1 / (w * dt**2), -1 / (w * dt), 0.0),  # (v1 - v0) / dt
             velocity=(1 / dt, 0.0, 0.0),  # s / dt
             rates=((1 / (w * dt), -(1 - w) / w, 0.0),),  # v1 of s/dt = (1 - w) v0 + w v1
-            velocity_defect=(
-                self.alpha,
-                0.0,
-                0.0,
-            ),  # s/dt - (v0 + v1)/2, with s replaced by v1 - v0
+            velocity_defect=(self.alpha, 0.0, 0.0),  # s/dt - (v0 + v1)/2, s for v1 - v0
         )
 
     def error_weights(self):
