@@ -60,12 +60,17 @@ def crank():
     return ub.Scene(bodies=[wheel, block], joints=[bearing, rail, rod], connectors=[spring, motor])
 
 
-def storeys(bays, floors):
-    """A frame with a name for each member, a force and line loads for each floor."""
+def storeys(bays, floors, law_of=lambda name: None):
+    """A frame with a name for each member, a force and line loads for each floor.
+
+    ``law_of`` returns the law of the hinges at both ends of a member.
+    """
     beams, joints, loads = [], {}, []
 
     def add(a, b, name):
-        beam = ub.Beam(a, b, STEEL, cells=2, name=name)
+        law = law_of(name)
+        hinges = {0: law, 1: law} if law else {}
+        beam = ub.Beam(a, b, STEEL, cells=2, name=name, hinges=hinges)
         beams.append(beam)
         for place in (beam.start, beam.end):
             joints.setdefault(place.point, []).append(place)
