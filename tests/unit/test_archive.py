@@ -16,6 +16,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 import numpy as np
+import pytest
 from helpers import raises, run
 from scenes import clamped
 
