@@ -69,22 +69,6 @@ def test_processes_that_fail_alike_end_without_an_abort():
 # -- in this process -------------------------------------------------------------------------------
 
 
-def test_calls_return_what_the_function_does():
-    agreement = Agreement(COMM)
-    assert agreement(divmod, 7, 2) == (3, 1)
-    agreement.synchronize(None)
-
-
-@pytest.mark.parametrize("rank", range(COMM.size))
-def test_one_process_raises_for_all(rank):
-    agreement = Agreement(COMM)
-    mine = ValueError("mine") if COMM.rank == rank else None
-    with pytest.raises(ValueError, match="mine") as raised:
-        agreement.synchronize(mine)
-    assert mine is None or raised.value is mine
-    assert COMM.size == 1 or agreement.raised is raised.value
-
-
 def test_other_exceptions_go_before_failed_steps():
     """A step that fails on one process may not be cut when the run ends on another."""
     agreement = Agreement(COMM)
