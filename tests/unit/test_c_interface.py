@@ -4,7 +4,6 @@
 import runpy
 import subprocess
 import sys
-import weakref
 
 from petsc4py import PETSc
 
@@ -13,7 +12,7 @@ import dolfinx
 import numpy as np
 import pytest
 from helpers import run
-from scenes import SECTION, clamped, rigid_chain
+from scenes import SECTION, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam import dolfinx_compat
@@ -53,17 +52,6 @@ def test_other_types_are_refused():
 
 
 @serial
-def test_arrays_live_as_long_as_the_struct_that_points_to_them():
-    values = np.array([1.0, 2.0])
-    alive = weakref.ref(values)
-    struct = c_library.fill(ffi.new("vector *"), size=2, values=values)
-    del values
-    assert list(struct.values[0 : struct.size]) == [1.0, 2.0]
-    del struct
-    assert alive() is None
-
-
-@serial
 @pytest.mark.parametrize(
     ("version", "numbers", "kind", "message"),
     [
@@ -84,9 +72,6 @@ def test_versions_of_dolfinx_and_numbers_of_petsc(monkeypatch, version, numbers,
         expected = pytest.warns if kind is RuntimeWarning else pytest.raises
         with expected(kind, match=message):
             runpy.run_path(dolfinx_compat.__file__)
-
-
-# -- Newton's method of C and of PETSc -------------------------------------------------------------
 
 
 def inelastic():
@@ -171,9 +156,6 @@ def test_an_interrupt_at_the_door_of_a_callback_is_not_lost():
     whole.step_to(0.02)
     whole.step_to(0.04)
     np.testing.assert_array_equal(simulation.q, whole.q)
-
-
-# -- errors of PETSc -------------------------------------------------------------------------------
 
 
 @serial

@@ -107,6 +107,9 @@ def test_estimates_and_covariance_of_a_linear_problem_are_those_of_least_squares
         np.testing.assert_allclose(result.half_widths, half, rtol=1e-6)
         for (low, high), p, w in zip(result.intervals.values(), best, half, strict=True):
             np.testing.assert_allclose((low, high), (p - w, p + w), rtol=1e-6)
+    exact = fit(measurement(truth()))  # without errors
+    np.testing.assert_allclose([*exact.parameters.values()], [2.0, -3.0], rtol=1e-6)
+    assert exact.cost < len(TIMES)
     # no warning is issued
 
 
@@ -180,6 +183,8 @@ def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
     np.testing.assert_allclose(interpolated(at, times, cubic(times)), cubic(at), atol=1e-14)
     stored = np.exp(times)
     np.testing.assert_allclose(interpolated(times, times, stored), stored, rtol=1e-15)
+    at_end = measurement(np.zeros(3), times=np.arange(1, 4) * 0.1, t=(0, 0.3), dt=0.1)
+    assert at_end.times[-1] == 0.3  # 3 times 0.1 is above it
     two = times[:2]
     assert interpolated([0.025], two, two) == pytest.approx([0.025])  # two times: a line
     h = np.array([0.02, 0.01])
@@ -204,13 +209,6 @@ def test_interpolation_at_fourth_order_is_of_sixth_order():
     at = measurement(np.zeros(301), times=fine.times, **options)
     steps = np.abs(tip(coarse) - tip(fine)[::10]).max()
     assert np.abs(at.computed(coarse) - tip(fine)).max() < 1.5 * steps
-
-
-def test_a_time_outside_of_the_run_by_round_off_is_its_end():
-    """3 times 0.1 is above 0.3."""
-    times = np.arange(1, 4) * 0.1
-    assert times[-1] > 0.3
-    assert measurement([1.0, 2.0, 3.0], times=times, t=(0, 0.3), dt=0.1).times[-1] == 0.3
 
 
 def test_a_first_row_without_a_value_is_left_out():
@@ -363,12 +361,6 @@ def test_failed_runs_shorten_the_step_of_the_search():
     assert result.parameters["a"] == pytest.approx(2.45, rel=1e-6)
     with raises("calibrate: the run at the start failed; give another", kind=ub.ConvergenceError):
         fit(measured, {"a": 50.0}, model)
-
-
-def test_data_without_errors_are_met():
-    result = fit(measurement(truth()))
-    np.testing.assert_allclose([*result.parameters.values()], [2.0, -3.0], rtol=1e-6)
-    assert result.cost < len(TIMES)
 
 
 def test_warnings_of_runs_in_the_search_are_not_repeated():

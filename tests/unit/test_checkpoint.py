@@ -47,9 +47,6 @@ def path(shared_path):
     return shared_path / "run.checkpoint"
 
 
-# -- what is refused -------------------------------------------------------------------------------
-
-
 def test_wrong_checkpoints_are_refused(path):
     for arguments, words in (
         ({}, "say how often"),
@@ -66,12 +63,7 @@ OTHERS = {
     "place": ({"frame": scene(x=2.0)}, "scene.beams[0] 'left'", " is 2.0, in the file 1.0"),
     "function": ({"frame": scene(lambda t: math.cos(3 * t))}, "loads[0].amplitude has changed"),
     "table": ({"frame": scene(ub.Table((0, 1), (0, 1)))}, "amplitude is Table, in the file func"),
-    "mass": (
-        {"frame": scene(bodies=[ub.Body((3, 0), mass=1.0, inertia=1.0)])},
-        "scene.bodies is 1 in a row, in the file 0 in a row",
-    ),
     "scheme": ({"scheme": ub.EnergyMomentum(0.1)}, "scheme.alpha is 0.1, in the file 0.0"),
-    "statics": ({"scheme": ub.Static()}, "scheme is Static, in the file EnergyMomentum"),
     "dt": ({"dt": 0.05}, "dt is 0.05, in the file 0.1"),
     "adaptive": ({"dt": ub.Adaptive(1e-3)}, "is ", ", in the file "),
     "beginning": ({"t": (0.1, 0.6)}, "t[0] is 0.1, in the file 0.0"),
@@ -94,9 +86,6 @@ def test_another_start_is_refused(path):
     run(path)
     with raises("start is ", ", in the file 'nothing'"):
         run(path, first.scene, start=first)
-
-
-# -- full disks ------------------------------------------------------------------------------------
 
 
 @pytest.mark.serial
@@ -122,9 +111,6 @@ def test_a_file_that_cannot_grow(path):
     assert (reached.q[: len(before)] == before).all()
     # With more space the same call goes on
     assert run(path, t=(0, 100.0), every=10**6).times[-1] == 100.0
-
-
-# -- who remembers ---------------------------------------------------------------------------------
 
 
 class Counting:
@@ -250,9 +236,6 @@ def test_by_the_clock(path, on_first_rank):
     assert on_first_rank(lambda: len(read(path)["history/q"])) == 6
 
 
-# -- descriptions ----------------------------------------------------------------------------------
-
-
 AMPLITUDE = 2.0
 
 
@@ -290,37 +273,6 @@ def test_what_contains_itself_and_arrays_and_dicts():
     assert difference(*arrays).startswith("x['a'] is float64 of shape (3,)")
     names = described({"a": 1}), described({"b": 1})
     assert difference(*names) == "x['a'] is 1.0, in the file there is none"
-
-
-# -- numbers of the grid ---------------------------------------------------------------------------
-
-
-def test_a_state_is_that_of_all_processes():
-    simulation = ub.Simulation(scene(), ub.EnergyMomentum())
-    subdomain, numbering = simulation.subdomain, simulation.numbering
-    archive, cells = Archive(subdomain), subdomain.cells.astype(float)
-    archive.at_dofs("dofs", subdomain.dofs.astype(float))
-    archive.added("added", np.ones(subdomain.size))
-    archive.total("total", 2.0)
-    archive.total("zero", -0.0)
-    archive.number("number", 3.0)
-    archive.rows("cells", subdomain.cells, np.column_stack([cells, -cells]))
-    state = archive.state()
-    assert (state["dofs"] == np.arange(numbering.size)).all()
-    assert state["added"].sum() == subdomain.total(subdomain.size)
-    assert state["total"] == 2.0 * subdomain.comm.size
-    assert math.copysign(1.0, state["zero"][0]) == -1.0
-    assert state["number"] == 3.0
-    assert (state["cells, 2"][:, 1] == np.arange(len(numbering.cells))).all()
-    back = Archive(subdomain, state)
-    assert (back.at_dofs("dofs", subdomain.dofs) == subdomain.dofs).all()
-    added = subdomain.total(back.added("added", subdomain.dofs).sum())
-    assert added == subdomain.total(subdomain.size)
-    assert subdomain.total(back.total("total", 0.0)) == 2.0 * subdomain.comm.size
-    rows = np.full((len(subdomain.cells), 2), np.nan)
-    assert (back.rows("cells", subdomain.cells, rows)[:, 1] == -subdomain.cells).all()
-    assert np.isnan(back.rows("others", subdomain.cells, rows)).all()
-    simulation.close()
 
 
 def test_the_last_step_of_cells_that_the_first_process_does_not_have():

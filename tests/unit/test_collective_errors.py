@@ -66,9 +66,6 @@ def test_processes_that_fail_alike_end_without_an_abort():
     assert "ABORT" not in run.stderr
 
 
-# -- in this process -------------------------------------------------------------------------------
-
-
 def test_other_exceptions_go_before_failed_steps():
     """A step that fails on one process may not be cut when the run ends on another."""
     agreement = Agreement(COMM)

@@ -79,10 +79,6 @@ def ring(law):
     return ub.Scene(bodies=[BLOCK, other], joints=bars, connectors=[strut])
 
 
-def prescribed(place):
-    return ub.PrescribedDisplacement(place, u=0, v=0, psi=lambda t: 0.1 * t)
-
-
 GUIDED = "Guided(ground (1, 0), block (1, 0))"
 ACROSS = "Slide(ground (1, 0), block (1, 0)) with "
 ALONG = "Slide(arm.end (1, 0), rod.start (1, 0)) with "
@@ -107,15 +103,9 @@ TABLE = {
     "rigid-plastic and Revolute": (
         lambda: joined(pin(), along(fuse())), [f"{ALONG}RigidPlastic", PIN, REASON]
     ),
-    "rigid-plastic and measured Revolute": (
-        lambda: joined(pin(multipliers=True), along(fuse())), [PIN, f"{ALONG}RigidPlastic", REASON]
-    ),
     "rigid-plastic and Rigid": (
         lambda: joined(ub.Rigid(ARM.end, ROD.start), met(fuse())),
         [f"{MET}RigidPlastic", RIGID, REASON],
-    ),
-    "rigid-plastic and Prismatic": (
-        lambda: led(rail(), across=fuse()), [RAIL, f"{ACROSS}RigidPlastic", REASON]
     ),
     "rigid-plastic and guide": (
         lambda: led(guide(), across=fuse()), [GUIDED, f"{ACROSS}RigidPlastic", REASON]
@@ -131,10 +121,6 @@ TABLE = {
     "two motors": (
         lambda: turned(motor(), motor()),
         [f"{FIRST} with PrescribedMotion; {FIRST} with PrescribedMotion", "Remove one"],
-    ),
-    "motor and PrescribedDisplacement": (
-        lambda: turned(motor(), support=prescribed),
-        [f"{FIRST} with PrescribedMotion", "PrescribedDisplacement at arm.start (0, 0)"],
     ),
     "motor and guide": (
         lambda: led(guide(), across=motor()), [GUIDED, f"{ACROSS}PrescribedMotion"]

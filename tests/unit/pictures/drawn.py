@@ -19,9 +19,6 @@ LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
 """Moments of the hinge and of yielding of the damaged arm, N m; fracture energy, J."""
 
 
-# -- models ------------------------------------------------------------------------------------
-
-
 def static(scene, dt=1.0, **more):
     """Static run from t = 0 to 1."""
     return ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, **more)
@@ -110,9 +107,6 @@ LAWS = [
     ub.RigidPlastic(ub.Softening(0.5, 1.0)),
 ]
 """A connector law of each kind."""
-
-
-# -- contents of figures -----------------------------------------------------------------------
 
 
 def outlines(figure, group, kind=object, *, fill=None, width=None):

@@ -23,9 +23,6 @@ def legend(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-# -- paths -------------------------------------------------------------------------------------
-
-
 def test_the_path_of_moment_and_curvature_is_that_of_the_law(damaged, arm):
     place = arm.at(0.3)
     figure = ub.plot(damaged, "moment-curvature", place)
@@ -71,14 +68,12 @@ def test_the_path_of_a_hinge_has_its_jump_and_moment(damaged, arm):
     title, spent = axes.get_title(loc="left"), with_unit(state.hinge[-1], "J")
     assert f"hinge at {arm.start}" in title
     assert f"{spent} dissipated, {100 * state.hinge[-1] / FRACTURE:.3g} % of 3 J" in title
-    fills = [p.vertices.T for c in axes.collections if len(c.get_paths()) < 9 for p in c.get_paths()]
-    areas = [abs(np.sum(x[:-1] * M[1:] - x[1:] * M[:-1])) / 2 for x, M in fills]
+    fills = [c for c in axes.collections if len(c.get_paths()) < 9]
+    points = [path.vertices.T for fill in fills for path in fill.get_paths()]
+    areas = [abs(np.sum(x[:-1] * M[1:] - x[1:] * M[:-1])) / 2 for x, M in points]
     # The steps in which the hinge begins to open start below its limit: by the moment of one step,
     # a tenth of the limit, over a jump that is a fiftieth of the whole.
     assert sum(areas) == pytest.approx(state.hinge[-1], rel=0.02)
-
-
-# -- the frame ---------------------------------------------------------------------------------
 
 
 def test_damage_colours_the_cells_that_yielded(damaged, arm):
@@ -155,9 +150,6 @@ def test_cracks_of_fibres_are_damage():
     assert not circles(axes)
 
 
-# -- the ledger --------------------------------------------------------------------------------
-
-
 def lines_of(figure):
     return {line.get_label(): line.get_ydata() for line in figure.axes[0].lines}
 
@@ -197,9 +189,6 @@ def test_dissipation_adds_the_energy_at_the_start():
     np.testing.assert_allclose(lines["at the start, and supplied"], 0.5, rtol=1e-12)
 
 
-# -- files -------------------------------------------------------------------------------------
-
-
 def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
     beam, path = yielding_beam(), shared_path / "run.xdmf"
     scene, scheme = moved(beam, v=lambda t: 0.1 * t), ub.EnergyMomentumStatic()
@@ -212,9 +201,6 @@ def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
     np.testing.assert_array_equal(written["jump"], jump)
     np.testing.assert_array_equal(written["dissipated energy"], state.plastic + spent)
     assert jump[0] != 0
-
-
-# -- what is refused ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("what", ["moment-curvature", "hinge", "damage", "dissipation"])

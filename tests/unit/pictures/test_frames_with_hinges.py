@@ -45,9 +45,6 @@ def words_of(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-# -- the model ---------------------------------------------------------------------------------
-
-
 def notes(figure):
     """Texts of the notes and their colours, from the top."""
     found = [x for x in figure.axes[0].texts if x.get_gid() == "notes"]
@@ -87,17 +84,6 @@ def test_many_different_limits_are_three_notes_and_a_range():
     assert [*found][:4] == [*words, "dots: 28 hinges, 40 kN m to 50 kN m"]
     colors = [*found.values()][:4]
     assert [len(middles(figure, "hinges", fill=x)) for x in colors] == [14, 14, 14, 28]
-
-
-def test_few_equal_hinges_keep_their_labels():
-    law = ub.ElastoPlastic(2e4, kinematic=1e5)
-    beam = ub.Beam((0, 0), (8, 0), STEEL, cells=8, hinges=dict.fromkeys((0, 0.25, 0.5, 0.75), law))
-    figure = ub.plot(clamped(beam))
-    assert texts(figure).count("hinge 20 kN m") == 4
-    assert not notes(figure)
-
-
-# -- damage ------------------------------------------------------------------------------------
 
 
 def rotations(path, n=-1):
@@ -156,9 +142,6 @@ def test_damage_of_a_mechanism_without_beams():
     assert bar.get_ylim()[1] == pytest.approx(1e3 * plastic)  # mrad
 
 
-# -- envelopes ---------------------------------------------------------------------------------
-
-
 def arrows(figure):
     """Marks of directions of beams, which are turned triangles."""
     marks = [line.get_marker() for line in figure.axes[0].lines]
@@ -192,9 +175,6 @@ def test_the_legend_names_no_arrow_without_arrows():
         words = words_of(figure)
         assert words
         assert all(re.fullmatch(rf"{what} [<>] 0: .*, from start to end", x) for x in words)
-
-
-# -- modes -------------------------------------------------------------------------------------
 
 
 def test_modes_show_both_phases_of_bodies():

@@ -57,6 +57,7 @@ def test_the_shape_has_all_beams_where_they_are(swing):
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
     assert axes.get_title(loc="left") == "shape at t = 0.1 s"
     assert not areas_of(figure)
+    assert not [*areas_of(ub.plot(swing, "M", n=0)), *texts(figure)]  # there is no force yet
 
 
 def in_a_row(count):
@@ -162,28 +163,6 @@ def test_the_legend_names_the_signs_in_the_picture(portal, diagrams):
     assert not ub.plot(portal).legends
 
 
-@pytest.mark.parametrize(("width", "height"), [(1.0, 1.0), (1.0, 3.0), (4.0, 1.0)])
-def test_the_axes_fill_the_figure(width, height):
-    """But for words and numbers: an inch or so in each direction."""
-    section = ub.Section(EA=1e9, GA=1e9, EI=1e7)
-    post = ub.Beam((0, 0), (0, height), section, cells=4)
-    roof = ub.Beam((0, height), (width, height), section, cells=4)
-    load = ub.PointLoad(roof.end, force=(0, -1e3))
-    scene = scenes.rigid_chain([post, roof], supports=[ub.Clamped(post.start)], loads=[load])
-    figure = ub.plot(static(scene), "M")
-    figure.draw_without_rendering()
-    inches = figure.get_size_inches()
-    blank = inches * (1 - figure.axes[0].get_position().size)
-    assert inches.max() <= 9.0
-    assert (blank < 1.5).all()
-
-
-def test_extremes_of_a_beam_of_one_cell_are_one_area():
-    extremes = ub.Extremes()
-    static(scenes.cantilever(cells=1, force=(0.0, 1.0)), record=extremes)
-    assert len(areas_of(ub.plot(extremes, "V"))) == 1
-
-
 def test_envelopes_are_two_diagrams():
     """Each area has ordinates of one of both, across the axis: none leads from one to the other."""
     section = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0, rhoI=0.01)
@@ -205,12 +184,8 @@ def test_envelopes_are_two_diagrams():
             assert np.isclose(scale * values, ordinate, rtol=1e-9).any()
         # From the lowest to the largest x along the tips, and back along the axis
         assert (np.diff(tips[:, 0]) >= 0).all()
-
-
-def test_there_is_no_diagram_without_a_force(swing):
-    figure = ub.plot(swing, "M", n=0)
-    assert not areas_of(figure)
-    assert not texts(figure)
+    static(scenes.cantilever(cells=1, force=(0.0, 1.0)), record=extremes)
+    assert len(areas_of(ub.plot(extremes, "V"))) == 1
 
 
 def test_a_saved_picture_has_the_size_of_its_figure(diagrams, tmp_path):
@@ -258,28 +233,22 @@ def test_shapes_of_a_path_on_a_plateau_have_different_colours():
     assert float(last) == pytest.approx(path.times[-1], rel=5e-3)
 
 
-@pytest.mark.parametrize(
-    ("component", "column", "label"),
-    [("u", 0, "displacement u (m)"), ("psi", 2, "rotation ψ (rad)"),
-     ("dv/dt", 1, "velocity dv/dt (m/s)")],
-)  # fmt: skip
-def test_a_history_has_a_line_for_each_place(swing, component, column, label):
-    beam = swing.scene.beams[0]
-    places = [beam.start, beam.at(0.3)]
-    axes = ub.plot(swing, "history", places, component=component).axes[0]
-    motion = swing.velocity if "/" in component else swing.displacement
-    for line, place in zip(axes.lines[1:], places, strict=True):
-        np.testing.assert_array_equal(line.get_xdata(), swing.times)
-        np.testing.assert_array_equal(line.get_ydata(), motion(place)[:, column])
-        assert line.get_label() == str(place)
-    assert axes.get_ylabel() == label
-    assert axes.get_xlabel() == "time t (s)"
-
-
-def test_a_history_may_be_of_one_place_of_a_body(engine):
-    place = engine.scene.bodies[0].middle
-    (_, line) = ub.plot(engine, "history", place).axes[0].lines
-    np.testing.assert_array_equal(line.get_ydata(), engine.displacement(place)[:, 1])
+def test_a_history_has_a_line_for_each_place(swing, engine):
+    (beam, *_), (wheel, _) = swing.scene.beams, engine.scene.bodies
+    for solution, component, column, label, places in (
+        (swing, "u", 0, "displacement u (m)", [beam.start, beam.at(0.3)]),
+        (swing, "dv/dt", 1, "velocity dv/dt (m/s)", [beam.start]),
+        (engine, "psi", 2, "rotation ψ (rad)", [wheel.middle]),
+    ):
+        axes = ub.plot(solution, "history", places, component=component).axes[0]
+        motion = solution.velocity if "/" in component else solution.displacement
+        for line, place in zip(axes.lines[1:], places, strict=True):
+            np.testing.assert_array_equal(line.get_xdata(), solution.times)
+            np.testing.assert_array_equal(line.get_ydata(), motion(place)[:, column])
+            assert line.get_label() == str(place)
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("time t (s)", label)
+    (_, line) = ub.plot(engine, "history", wheel.middle).axes[0].lines
+    np.testing.assert_array_equal(line.get_ydata(), engine.displacement(wheel.middle)[:, 1])
 
 
 def test_the_ledger_is_drawn_with_its_error(swing):
@@ -317,12 +286,9 @@ def test_spectra_share_axes():
     assert ub.plot(elastic, "ductility").axes[0].get_ylabel() == "ductility"
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(0.0, "0 N m"), (-12345.0, "−12.3 kN m"), (999.9, "1 kN m"), (0.0158, "15.8 mN m")],
-)
-def test_values_have_a_decimal_prefix(value, text):
-    assert with_unit(value, "N m") == text
+def test_values_have_a_decimal_prefix():
+    values = {0.0: "0 N m", -12345.0: "−12.3 kN m", 999.9: "1 kN m", 0.0158: "15.8 mN m"}
+    assert [with_unit(value, "N m") for value in values] == [*values.values()]
 
 
 ELSEWHERE = ub.Camera(follow=ub.Body((0, 0), mass=1.0, inertia=1.0).middle)

@@ -30,9 +30,6 @@ def zigzags(figure):
     return [x for x in outlines(figure, "connectors", LineCollection) if len(x) > 8]
 
 
-# -- bodies ------------------------------------------------------------------------------------
-
-
 def test_outlines_of_bodies_move_rigidly_and_enclose_the_places_of_joints(engine):
     shown = (0, 5, 10)
     figure = ub.plot(engine, "shapes", engine.times[[*shown]])
@@ -67,20 +64,20 @@ def test_bodies_are_drawn_without_beams(engine, engine_drawn):
 
 
 def test_a_single_body_is_in_the_picture():
-    falling = ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=0.1)], loads=[ub.Gravity()])
-    solution = run(falling)
-    for n in (0, -1):  # a scene without any size; and one that has fallen 5 m
-        figure = ub.plot(solution, n=n)
-        (outline,) = outlines(figure, "bodies", fill=FILLED)
-        (x, y), r = solution.position(falling.bodies[0].middle)[n], np.ptp(outline[:, 0]) / 2
-        np.testing.assert_allclose(np.linalg.norm(outline - (x, y), axis=1), r, rtol=1e-12)
-        low, high = figure.axes[0].get_ylim()
-        assert low < y - r < y + r < high
+    """Also of a scene that has no size, or is far away."""
+    for x in (0.0, 1e5):
+        body = ub.Body((x, 0), mass=1.0, inertia=0.1)
+        solution = run(ub.Scene(bodies=[body], loads=[ub.Gravity()]))
+        for n in (0, -1):  # it has fallen 5 m
+            figure = ub.plot(solution, n=n)
+            (outline,) = outlines(figure, "bodies", fill=FILLED)
+            at, r = solution.position(body.middle)[n], np.ptp(outline[:, 0]) / 2
+            radii = np.linalg.norm(outline - at, axis=1)
+            np.testing.assert_allclose(radii, r, rtol=1e-12, atol=1e-15 * x)
+            low, high = figure.axes[0].get_ylim()
+            assert low < at[1] - r < at[1] + r < high
     with pytest.raises(ub.ArgumentError, match="neither beams nor connectors"):
         ub.plot(solution, "dissipation")
-
-
-# -- joints ------------------------------------------------------------------------------------
 
 
 def test_links_and_springs_reach_from_place_to_place(engine, engine_drawn):
@@ -190,9 +187,6 @@ def test_beams_bodies_and_their_joints_are_in_one_picture():
     np.testing.assert_allclose(connector, ends, atol=1e-12)
 
 
-# -- connectors --------------------------------------------------------------------------------
-
-
 def slider(connect, *laws):
     """A body on a rail at an angle, pushed, with connectors to the ground."""
     body = ub.Body((1.0, 0.0), mass=1.0, inertia=0.1)
@@ -252,9 +246,6 @@ def test_connectors_are_drawn_in_a_run_without_beams():
         assert len(outlines(figure, "connectors")) >= len(LAWS[1:-1])
     drawn = {x.get_label(): x.get_ydata() for x in ub.plot(solution, "dissipation").axes[0].lines}
     assert drawn["supplied"][-1] > 0.0
-
-
-# -- supports ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
