@@ -4,7 +4,6 @@
 import numpy as np
 import pytest
 from drawn import FRACTURE, circles, moved, outlines, static, yielding_beam
-from scenes import clamped
 from time_series import read_xdmf
 
 import ufl_beam as ub
@@ -40,18 +39,6 @@ def test_the_path_of_moment_and_curvature_is_that_of_the_law(damaged, arm):
     assert legend(figure) == ["t = 0 s", "t = 3 s"]
     for mark, end in zip(circles(axes), path[[0, -1]], strict=True):
         np.testing.assert_array_equal(mark.get_xydata()[0], end)
-
-
-def test_units_suit_the_values_and_data_stay_in_si():
-    section = ub.Section(1e9, 1e9, 1e6, bending=ub.ElastoPlastic(5e3))
-    beam = ub.Beam((0, 0), (1, 0), section, cells=1)
-    turn = ub.PointLoad(beam.end, moment=4e3, amplitude=ub.ramp(1.0))
-    solution = static(clamped(beam, loads=[turn]), dt=1 / 30)
-    axes = ub.plot(solution, "moment-curvature", beam.end).axes[0]
-    assert axes.get_ylabel() == "bending moment M (kN m)"
-    assert axes.yaxis.get_major_formatter()(-2500.0) == "−2.5"
-    # One cell in pure bending has the moment of the load, but for the tolerance of equilibrium
-    assert path_in(axes)[0][-1, 1] == pytest.approx(4e3, rel=1e-9)
 
 
 def test_the_path_of_a_hinge_has_its_jump_and_moment(damaged, arm):

@@ -51,18 +51,6 @@ def notes(figure):
     return {x.get_text(): x.get_color() for x in sorted(found, key=lambda x: -x.get_position()[1])}
 
 
-def test_many_equal_connectors_have_one_note():
-    """A connector with another law, or with a name, keeps its label."""
-    beam = ub.Beam((0, 0), (6, 0), STEEL, cells=6)
-    law = ub.Spring(2e6)
-    springs = [ub.Slide(ub.ground(x, 0), beam.at(x / 6), law, axis=(0, 1)) for x in range(1, 6)]
-    other = ub.Slide(ub.ground(6, 0), beam.end, ub.Spring(3e6), axis=(0, 1))
-    figure = ub.plot(clamped(beam, connectors=[*springs, other]))
-    assert [*notes(figure)] == ["5 connectors: 2 MN/m"]
-    assert [x for x in texts(figure) if "MN/m" in x] == ["5 connectors: 2 MN/m", "3 MN/m"]
-    assert not notes(ub.plot(clamped(beam, connectors=springs[:4])))
-
-
 def test_many_equal_hinges_have_one_note():
     """4 x 5 columns and 3 x 5 girders; the colour of the note is that of its hinges."""
     figure = ub.plot(frame(by_kind))

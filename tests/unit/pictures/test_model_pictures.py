@@ -132,21 +132,6 @@ def test_arrows_end_where_they_push_and_begin_where_they_pull(force, end):
     assert np.allclose((nearest - (1.0, 0.0)) @ (-way[1], way[0]), 0.0, atol=1e-12)
 
 
-def test_a_line_load_is_a_comb_and_stands_on_the_one_before():
-    beam = ub.Beam((0, 0), (4, 0), STEEL)
-    loads = [ub.LineLoad(beam, force=(0, -f)) for f in (1e3, 2e3)]
-    figure = ub.plot(ub.Scene([beam], loads=loads))
-    heads = outlines(figure, "loads", PolyCollection)
-    tips = np.array([head[0] for head in heads])
-    assert len(heads) % 2 == 0
-    first, second = np.split(tips, 2)
-    np.testing.assert_allclose(first[[0, -1], 0], [0.0, 4.0], atol=1e-12)
-    assert np.ptp(first[:, 1]) < 1e-12 < first[0, 1] < second[0, 1]
-    lines = outlines(figure, "loads", LineCollection)
-    tops = sorted({float(line[:, 1].max()) for line in lines})
-    assert first[0, 1] < tops[0] < second[0, 1] < tops[-1]  # no comb reaches into the other
-
-
 def test_hinges_are_at_their_places():
     """Those of a beam, and those of a section in all cells and at the ends."""
     law = ub.Softening(2e4, 1e3)
