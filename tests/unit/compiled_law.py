@@ -37,3 +37,25 @@ def compiled_law(law, scheme):
 
     law_at.keeps = pointwise
     return law_at
+
+
+def require_tangent(law, scheme, steps, ε, tolerance, *, dt=0.01, state=1e-3):
+    """Derivatives of a law in steps between motions are central differences of its forces.
+
+    ``tolerance`` returns the allowed error of the forces and derivatives of a step.
+    """
+    n, compiled = law.components, compiled_law(law, scheme)
+    known = {f"number {x}": value for x, value in law.parameters().items()}
+    known |= {"dt": dt, "theta": scheme.theta} | {f"state {x}": state for x in law.variables}
+
+    def answers(e0, e1):
+        before = {f"before {i}": x for i, x in enumerate(e0)}
+        found = compiled(known | before | {f"motion {i}": x for i, x in enumerate(e1)})
+        return found[:n], found[n:].reshape(n, n)
+
+    for step in steps:
+        e0, e1 = np.reshape(step, (2, n))
+        force, slopes = answers(e0, e1)
+        changes = [answers(e0, e1 + e)[0] - answers(e0, e1 - e)[0] for e in ε * np.eye(n)]
+        error = np.abs(slopes - np.transpose(changes) / (2 * ε))
+        assert (error <= tolerance(force, slopes)).all()

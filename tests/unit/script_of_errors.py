@@ -219,12 +219,6 @@ def asked(fail):
     connected(ub.Controller(force))
 
 
-def own(fail):
-    """A small scene, which each process computes for itself."""
-    parallel.SMALLEST_SUBDOMAIN = 10**6
-    load(fail)
-
-
 def building(fail):
     """Before the processes share anything."""
     run(scene(time=fail), start=run(scene()))

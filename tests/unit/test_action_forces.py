@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers import run
+from helpers import in_turn, run
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -17,8 +17,7 @@ def hinged(action):
     """Two beams with a pin between them and clamps at the other ends."""
     a = ub.Beam((0, 0), (1, 0), SECTION, cells=3, name="a")
     b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
-    end = ub.PrescribedDisplacement(b.end, u=0, v=0, psi=0)
-    loads = []
+    end, loads = ub.PrescribedDisplacement(b.end, u=0, v=0, psi=0), []
     if action == "pressure":
         loads = [ub.Pressure(a, 300.0, 50.0, lambda t: t, profile=(1, 2)), ub.Pressure(b, -200.0)]
     elif action == "moving":
@@ -29,21 +28,18 @@ def hinged(action):
         )
     else:
         loads = [ub.PointLoad(b.at(0.5), (-300.0, 0), amplitude=lambda t: math.sin(8 * t))]
-    scene = ub.Scene(
-        [a, b],
-        joints=[ub.Revolute(a.end, b.start, multipliers=True)],
-        supports=[ub.Clamped(a.start), end],
-        loads=loads,
-    )
+    pin = ub.Revolute(a.end, b.start, multipliers=True)
+    scene = ub.Scene([a, b], joints=[pin], supports=[ub.Clamped(a.start), end], loads=loads)
     return st.imperfect(scene, sway=0.01, bow={a: 0.05, b: -0.1}) if action == "bow" else scene
 
 
-@pytest.mark.parametrize("action", ["pressure", "moving", "settlement", "bow"])
-@pytest.mark.parametrize(
-    ("scheme", "degree"),
-    [(ub.Static(), 1), (ub.EnergyMomentum(), 2), (ub.GeneralizedAlpha(0.8), 3)],
-)
-def test_ends_of_diagrams_and_envelopes(action, scheme, degree):
+ACTIONS = "pressure", "moving", "settlement", "bow"
+SCHEMES = (ub.Static(), 1), (ub.EnergyMomentum(), 2), (ub.GeneralizedAlpha(0.8), 3)
+
+
+@pytest.mark.parametrize(("action", "scheme"), in_turn(ACTIONS, SCHEMES), ids=str)
+def test_ends_of_diagrams_and_envelopes(action, scheme):
+    scheme, degree = scheme
     scene, extremes = hinged(action), ub.Extremes(points=3)
     (a, b), (clamp, end), (pin,) = scene.beams, scene.supports, scene.joints
     found = run(

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from compiled_law import compiled_law
+from compiled_law import require_tangent
 from helpers import raises, require_restart
 from scipy.optimize import minimize
 
@@ -33,7 +33,6 @@ def test_a_step_projects_on_the_yield_surface(seed):
     """Against minimization of the energy norm by SciPy; corners and elastic states included."""
     random = np.random.default_rng(seed)
     N, M = random.normal(size=2) * (2 * NP, 2 * MP) * (1.0, 0.02 if seed % 4 == 0 else 1.0)
-    found = projected(N, M)
 
     def distance(x):
         n, m = x * (NP, MP)
@@ -46,9 +45,9 @@ def test_a_step_projects_on_the_yield_surface(seed):
         distance, np.array([0.1, 0.1]), constraints=inside, method="SLSQP",
         options={"ftol": 1e-15, "maxiter": 500},
     )  # fmt: skip
+    n, m = np.array(projected(N, M)) / (NP, MP)
     # SLSQP finds minima to the square root of the precision of the distance
-    assert np.array(found) / (NP, MP) == pytest.approx(exact.x, abs=1e-5)
-    n, m = np.array(found) / (NP, MP)
+    assert (n, m) == pytest.approx(exact.x, abs=1e-5)
     assert n**2 + abs(m) < 1 + 1e-12
 
 
@@ -59,22 +58,12 @@ def test_a_step_far_outside_reaches_the_surface():
         assert n**2 + abs(m) == pytest.approx(1.0, abs=2e-10)
 
 
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=str)
-def test_tangents_are_derivatives(scheme):
+def test_tangents_are_derivatives():
     """Against central differences, elastic, on the surface and at a corner."""
-    law = compiled_law(LAW, scheme)
-    known = {f"number {n}": x for n, x in LAW.parameters().items()}
-    known |= {f"state {n}": 0.0 for n in LAW.variables} | {"dt": 0.1, "theta": scheme.theta}
-    known |= {f"before {k}": 0.0 for k in range(3)}
-
-    def ask(e):
-        return law(known | {f"motion {k}": e[k] for k in range(3)})
-
-    for e in np.array([(1e-3, 1e-3, 2e-3), (3e-3, 0, 2e-2), (-2e-2, 0, -1e-2), (1e-2, 0, 1e-5)]):
-        ε = 1e-8
-        steps = [(ask(e + ε * one)[:3] - ask(e - ε * one)[:3]) / (2 * ε) for one in np.eye(3)]
-        # 1e-16/ε of forces of 400 N
-        assert ask(e)[3:].reshape(3, 3) == pytest.approx(np.array(steps).T, abs=1e-4 * 2e5)
+    ends = np.array([(1e-3, 1e-3, 2e-3), (3e-3, 0, 2e-2), (-2e-2, 0, -1e-2), (1e-2, 0, 1e-5)])
+    steps = [(np.zeros(3), e) for e in ends]
+    # 1e-16/ε of forces of 400 N, beside stiffnesses of 2e5 N/m
+    require_tangent(LAW, ub.EnergyMomentum(), steps, 1e-8, lambda *_: 20.0, dt=0.1, state=0.0)
 
 
 def column(**more):
@@ -117,11 +106,6 @@ def test_dynamics_close_the_ledger(tmp_path, as_by_reference):
     assert np.diff(lost).min() > -1e-12 * lost[-1]
     simulate = partial(ub.simulate, dt=2e-3)
     require_restart(simulate, scene(loads=[push]), [hinge], ub.EnergyMomentum(), tmp_path, 0.2)
-
-
-def test_numbers_must_be_positive():
-    with raises("AxialBendingHinge: turning = 0", kind=ub.ModelError):
-        st.AxialBendingHinge(1.0, 1.0, 1.0, 1.0, 0.0)
 
 
 # -- results for engineers -------------------------------------------------------------------------
@@ -173,8 +157,8 @@ def turned(laws):
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()], ids=str)
 def test_hinge_laws_have_the_results_of_a_spring_that_yields(scheme):
-    """Events, table and ledger; the moment is uniform, so all hinges turn alike."""
-    feet, scene = turned(LAWS.values())
+    """Events, table and ledger; the moment is uniform, so all hinges turn alike; not a pin."""
+    (*feet, pin), scene = turned([*LAWS.values(), Mine(3e3, MP), *PINS])
     events = ub.Events()
     run = ub.simulate(scene, scheme, t=(0, 1), dt=0.02, record=events)
     assert {event.where for event in events.found} == {*feet}
@@ -182,47 +166,22 @@ def test_hinge_laws_have_the_results_of_a_spring_that_yields(scheme):
     assert {event.what for event in events.found} == {"yields"}
     assert np.ptp([event.time for event in events.found]) < 0.021
     rows = {row.where: row for row in st.hinge_table(run, {"IO": 0.05, "CP": 0.2}).rows}
+    assert {*rows} == {*feet}
     spring = rows[feet[0]]
     for foot in feet:
-        # Round-off of Newton's method, 1e-9 of the forces
-        numbers = [getattr(rows[foot], name) for name in ("rotation", "plastic", "ductility")]
-        expected = [getattr(spring, name) for name in ("rotation", "plastic", "ductility")]
-        assert numbers == pytest.approx(expected, rel=1e-6)
+        # The elastic rotation of a law of a user is not known
+        for name in ("rotation", *(("plastic", "ductility") if foot is not feet[-1] else ())):
+            # Round-off of Newton's method, 1e-9 of the forces
+            assert getattr(rows[foot], name) == pytest.approx(getattr(spring, name), rel=1e-6)
         assert rows[foot].state == spring.state == "CP"
         assert rows[foot].n == run.times.tolist().index(rows[foot].time) > 0
         # Of the first step beyond the limit the trapezoidal work is known
         assert rows[foot].dissipated == pytest.approx(spring.dissipated, rel=0.02)
-    assert {*run.energy.lost} - {"numerical"} == {"plastic"}
     total = sum(row.dissipated for row in rows.values())
     assert run.energy.lost["plastic"][-1] == pytest.approx(total, rel=1e-12)
+    lost, work = run.connector(pin).dissipated[-1], run.connector(pin).work[-1]
+    assert lost > 1e-3 * work > 0 or scheme != ub.Static()
     assert [row.where for row in st.hinge_table(run, only=[feet[1]]).rows] == [feet[1]]
-
-
-def test_hinges_of_users_with_several_components_are_listed():
-    """A law of three components yields; a pin with friction in a hole does not."""
-    feet, scene = turned([LAWS["spring"], Mine(3e3, MP), *PINS])
-    events = ub.Events()
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, record=events)
-    assert {event.where for event in events.found} == {*feet[:2]}
-    assert run.connector(feet[2]).dissipated[-1] > 1e-3 * run.connector(feet[2]).work[-1] > 0
-    first, second = st.hinge_table(run).rows
-    assert {first.where, second.where} == {*feet[:2]}
-    assert first.rotation == pytest.approx(second.rotation, rel=1e-6)
-    assert run.energy.lost["plastic"][-1] == pytest.approx(first.dissipated + second.dissipated)
-
-
-def test_events_of_bushings_continue_after_a_restart(tmp_path):
-    """Works and losses of all components count, before and after."""
-    feet, scene = turned([LAW, LAWS["deteriorating"]])
-    whole, parts = ub.Events(), [ub.Events() for _ in range(2)]
-    simulate = partial(ub.simulate, scene, ub.Static(), dt=0.02)
-    run = simulate(t=(0, 1), record=whole)
-    assert {event.where for event in whole.found} == {*feet}
-    kept = ub.Checkpoint(tmp_path / "run.checkpoint", every=1)
-    for events, end in zip(parts, (0.5, 1.0), strict=True):
-        last = simulate(t=(0, end), record=events, checkpoint=kept)
-    assert [*map(str, parts[1].found)] == [*map(str, whole.found)]
-    assert str(st.hinge_table(last)) == str(st.hinge_table(run))
 
 
 def test_pictures_show_hinges_of_connectors():
@@ -232,7 +191,8 @@ def test_pictures_show_hinges_of_connectors():
     for what, n in (("damage", -1), ("shape", 0)):
         axes = ub.plot(run, what, n=n).axes[0]
         marks = [x.get_xydata()[0] for x in axes.lines if len(x.get_xdata()) == 1]
-        drawn = [tuple(at) for at in marks if x_is_foot(at)]
+        # The feet are at x = 0 and y = 0, 1, 2, ...
+        drawn = [at for at in marks if np.allclose(at, (0, np.round(at[1])), rtol=0, atol=1e-9)]
         assert len(drawn) == (len(feet) if n else 0)
     for foot in feet:
         axes = ub.plot(run, "hinge", foot).axes[0]
@@ -243,8 +203,3 @@ def test_pictures_show_hinges_of_connectors():
         assert f"hinge at {foot}" in axes.get_title(loc="left")
     with raises("no rotation whose law may yield"):
         ub.plot(run, "hinge", pin)
-
-
-def x_is_foot(at):
-    """The feet are at x = 0, and y = 0, 1, 2, ..."""
-    return abs(at[0]) < 1e-9 and abs(at[1] - round(at[1])) < 1e-9

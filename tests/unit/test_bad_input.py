@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Messages of errors: which object is wrong, why, and what to do.
 
-Kinds of wrong values of each argument are refused in test_wrong_arguments.py.
+The names of object and argument in messages on single values are tested in test_wrong_arguments.py.
 """
 
 import math
@@ -59,9 +59,6 @@ def test_errors_are_a_value_error_or_a_type_error_too():
     assert not isinstance(error.value, ub.ModelError | TypeError)
 
 
-# -- parts of a model ------------------------------------------------------------------------------
-
-
 def push(amplitude):
     return ub.PointLoad(END, force=(1, 0), amplitude=amplitude)
 
@@ -80,30 +77,17 @@ def wave(s):
 
 PARTS = [
     # numbers
-    (lambda: ub.Section(1.0, 1.0, 0.0), "Section: EI = 0 must be positive"),
-    (lambda: ub.Section(1.0, 1.0, -2.5), "Section: EI = -2.5 must be positive"),
     (lambda: ub.Section(1.0, 1.0, math.nan), "Section: EI = nan is not finite"),
-    (lambda: ub.Section(1.0, 1.0, math.inf), "Section: EI = inf is not finite"),
-    (lambda: ub.Section(1.0, 1.0, "x"), "Section: EI = 'x' is not a number"),
     (lambda: ub.Section(1.0, 1.0, None), "Section: EI = None is not a number"),
-    (lambda: ub.PointMass(END, -1.0), "PointMass at girder.end (1, 0): mass = -1...at least 0"),
     (lambda: beam(cells=2.5), "girder: cells = 2.5 must be a whole number, at least 1"),
-    (lambda: beam(end=3.0), "girder: end = 3.0 must be a pair (x, y)"),
     (lambda: GIRDER.at(1.5), "girder.at(1.5): s must lie between 0 and 1"),
-    (lambda: ub.EnergyMomentum(alpha=0.6), "EnergyMomentum: alpha = 0.6...between 0 and 0.5"),
-    (lambda: ub.XDMF("a.xdmf", every=0), "XDMF a.xdmf: every = 0 must be a whole number"),
     # sections
     (lambda: ub.Section.tube(0.1, 0.06, **STEEL), "tube: wall t = 0.06 m is thicker than the"),
     (lambda: st.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: ...do not fit"),
-    (lambda: st.i_shape(0.1, 0.1, 0.2, 0.01, **STEEL), "i_shape: ...do not fit"),
     (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), "nu = 0.6 must lie in (-1, 0.5]"),
     # laws
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),
-    (lambda: ub.ElastoPlastic(1.0, kinematic=-2.0), "kinematic = -2 must not...use Softening("),
-    (lambda: ub.ElastoPlastic(1.0, viscosity=5.0), "viscosity = 5.0 is not a Perzyna or DuvautL"),
-    (lambda: ub.Section(1, 1, 1, bending=BREAKS), "Section: bending...is not an ElastoPlastic"),
     (lambda: in_fibres(bending=STEEL_LAW), "Section: a law bending beside fibres"),
-    (lambda: in_fibres(axial=STEEL_LAW), "Section: a law axial beside fibres"),
     (lambda: in_fibres(shear=STEEL_LAW), "Section: a law shear beside fibres...elastic"),
     (lambda: in_fibres(hinge=BREAKS), "Section: a law hinge beside fibres"),
     # one layer, whose middle is the axis
@@ -115,13 +99,8 @@ PARTS = [
     (lambda: beam((1, 2), (1, 2)), "girder: zero length, both ends are at (1.0, 2.0)"),
     (lambda: ub.Beam.arc((0, 0), 1.0, (2, 2), SECTION), "beam: zero length, both angles...are 2"),
     (lambda: ub.Beam.polyline([(0, 0)], SECTION), "a polyline needs at least two points, not 1"),
-    (
-        lambda: ub.Beam.polyline([(0, 0), (1, 0), (1, 0)], SECTION),
-        "beam: zero length between two points at (1.0, 0.0)",
-    ),
+    (lambda: ub.Beam.polyline([(0, 0), (1, 0), (1, 0)], SECTION), "between two points at (1.0"),
     (lambda: ub.Beam.along(wave, SECTION, cells=4), "beam: curve(0.5)[1] = inf is not finite"),
-    (lambda: beam(hinges={1.5: BREAKS}), "girder: hinge at s = 1.5 must lie between 0 and"),
-    (lambda: beam(hinges={0.5: 3.0}), "girder: hinges[0.5] = 3.0...a Softening or Elasto"),
     (lambda: beam(hinges={0.5: BREAKS, 0.5 + 1e-13: BREAKS}), "two hinges at s = 0.5...give one"),
     (
         lambda: ub.Beam((0, 0), (1, 0), in_fibres(), hinges={0.5: BREAKS}),
@@ -129,30 +108,15 @@ PARTS = [
     ),
     # functions of time
     (lambda: ub.Table([0, 2, 1], [0, 0, 0]), "Table: times must increase...times[1] = 2...by 1"),
-    (lambda: ub.Table([0, 1, 1], [0, 0, 1]), "Table: times must increase...times[1] = 1...by 1"),
     (lambda: ub.Table([0, 1], [0]), "Table: 2 times and 1 values; give the same number of each"),
-    (lambda: ub.Table([], []), "Table: 0 times and 0 values"),
     (lambda: push(lambda t: 1 / t), "the time function fails at t = 0: ZeroDivisionError"),
-    (lambda: push(lambda t: math.nan), "the time function is nan at t = 0"),
-    (
-        lambda: push(lambda t: "x"),
-        "PointLoad at girder.end...returned 'x' at t = 0 s; it must",
-    ),
-    (lambda: push(lambda: 1.0), "the time function fails at t = 0: TypeError"),
-    (lambda: push(2.0), "amplitude = 2.0 must be a function of t, such as ub.Table"),
+    (lambda: push(lambda t: "x"), "PointLoad at girder.end...returned 'x' at t = 0 s; it must"),
     # supports and joints
     (lambda: ub.Clamped(GIRDER), "Clamped...is not a place; use beam.start, .end or .at(s)"),
     (lambda: ub.Roller(END, along=(0, 0)), "Roller at girder.end...no direction"),
     (lambda: ub.PrescribedDisplacement(END), "nothing...at least one of u, v, psi"),
-    (lambda: ub.Rigid(END), "Rigid: a joint needs at least two places"),
-    (lambda: ub.Revolute(), "Revolute: a joint needs at least two places"),
+    (lambda: ub.Revolute(END), "Revolute: a joint needs at least two places"),
 ]
-
-
-@pytest.mark.parametrize(("make", "says"), PARTS, ids=[says for _, says in PARTS])
-def test_a_message_says_why_a_part_is_refused(make, says):
-    with raises(says):
-        make()
 
 
 @pytest.mark.parametrize(
@@ -162,16 +126,13 @@ def test_a_message_says_why_a_part_is_refused(make, says):
         lambda: ub.ElastoPlastic(math.inf, 0.0, 0.0, ub.DuvautLions(math.inf)),
         lambda: ub.Softening(math.inf, 1.0),
         lambda: ub.LinearSoftening(0.0, 1.0),
-        lambda: beam(hinges={0.0: BREAKS, 1.0: ub.LinearSoftening(1.0, 1.0)}),
+        lambda: beam(hinges={0.0: BREAKS, 1.0: ub.LinearSoftening(1.0, 1.0)}, cells=2.0),
         lambda: ub.EnergyMomentumStatic(0.5),
         lambda: in_fibres(ub.Fibres(STEEL_LAW, number=2, softening=BREAKS)),
     ],
 )
 def test_limits_of_ranges_are_allowed(make):
     assert make() is not None
-
-
-# -- scenes ----------------------------------------------------------------------------------------
 
 
 def held_twice(first, second):
@@ -204,6 +165,10 @@ def rubbed(pressing):
     return ub.Scene([GIRDER, RIGHT], connectors=[rub], **{kind: [pressing]})
 
 
+RUBS = ub.Coulomb(coefficient=1.0, joint=ub.Pinned(GIRDER.start))
+PRESSED = ub.Turn(ub.ground(1, 0), END, RUBS)
+
+
 def thrown(*velocities):
     """Simulation of two beams on one hinge."""
     two = ub.Scene([GIRDER, RIGHT], joints=[HINGE], initial=velocities)
@@ -212,26 +177,24 @@ def thrown(*velocities):
 
 SHORT, ROOF = beam((0, 0), (0, 3.75), name="short"), beam((0, 4), (6, 4), name="roof")
 HALT = ub.Beam.along(lambda s: (max(s, 0.5), 0.0), SECTION, cells=4, name="halt")
-ABSENT = "...stray is not in the scene; add it to beams"
+OF_ABSENT = {
+    "supports": ub.Clamped(STRAY.start),
+    "loads": ub.PointLoad(STRAY.end),
+    "masses": ub.PointMass(STRAY.end, 1.0),
+    "initial": ub.Velocity([STRAY]),
+    "joints": ub.Rigid(STRAY.start, STRAY.end),
+}
+"""Parts of a beam that is not in the scene."""
+
 SCENES = [
     (lambda: ub.Scene([]), "Scene: no beams"),
-    (
-        lambda: ub.Scene([GIRDER, TWIN, GIRDER]),
-        "girder is in the scene twice, as beams[0] and beams[2]",
+    (lambda: ub.Scene([GIRDER, TWIN, GIRDER]), "girder is in the scene twice, as beams[0] and b"),
+    (lambda: scene(loads=[ub.Clamped(END)]), "loads[0] = ...is not a PointLoad or FollowerLoad or"),
+    *(
+        (lambda part=part, one=one: scene(**{part: [one]}),
+         type(one).__name__ + "...stray is not in the scene; add it to beams")
+        for part, one in OF_ABSENT.items()
     ),
-    (lambda: scene(joints=[ub.Clamped(END)]), "Scene: joints[0] = ...is not a Joint"),
-    (
-        lambda: scene(loads=[ub.Clamped(END)]),
-        "Scene: loads[0] = ...is not a PointLoad or FollowerLoad or LineLoad or Pressure",
-    ),
-    # parts of a beam that is not in the scene
-    (lambda: scene(supports=[ub.Clamped(STRAY.start)]), "Clamped at stray.start" + ABSENT),
-    (lambda: scene(loads=[ub.PointLoad(STRAY.end)]), "PointLoad" + ABSENT),
-    (lambda: scene(loads=[ub.FollowerLoad(STRAY.end)]), "FollowerLoad" + ABSENT),
-    (lambda: scene(loads=[ub.LineLoad(STRAY)]), "LineLoad" + ABSENT),
-    (lambda: scene(masses=[ub.PointMass(STRAY.end, 1.0)]), "PointMass" + ABSENT),
-    (lambda: scene(initial=[ub.Velocity([STRAY])]), "Velocity" + ABSENT),
-    (lambda: scene(joints=[ub.Rigid(STRAY.start, STRAY.end)]), "Rigid(stray.start" + ABSENT),
     # joints
     (
         lambda: ub.Scene([SHORT, ROOF], joints=[ub.Rigid(ROOF.start, SHORT.end)]),
@@ -242,73 +205,34 @@ SCENES = [
         "Revolute: joint ends lie 1 m apart: girder.start (0, 0) and twin.end (1, 0)",
     ),
     (
-        lambda: scene(joints=[ub.Rigid(END, GIRDER.at(1.0))]),
-        "Rigid(girder.end (1, 0), girder.end (1, 0)): the same place twice",
-    ),
-    (
         lambda: ub.Scene([GIRDER, TWIN], joints=[ub.Rigid(END, TWIN.end, TWIN.end)]),
-        "the same place twice",
+        "Rigid(...twin.end (1, 0), twin.end (1, 0)): the same place twice",
     ),
     # supports in conflict; an inclined roller takes both displacements of its place
-    (
-        lambda: held_twice(ub.Clamped, ub.Pinned),
-        "in conflict...girder.end (1, 0) and...both hold u; remove one",
-    ),
-    (lambda: held_twice(ub.Pinned, ub.Roller), "in conflict...both hold v; remove one"),
+    (lambda: held_twice(ub.Clamped, ub.Pinned), "in conflict...girder.end (1, 0)...both hold u"),
     (lambda: held_twice(ub.Roller, inclined), "in conflict...both hold v; remove one"),
     (lambda: held_twice(upright, inclined), "in conflict...both hold u; remove one"),
     (lambda: held_twice(ub.Clamped, moved(psi=1.0)), "in conflict...both hold psi; remove one"),
-    (lambda: held_twice(moved(u=0), moved(u=1.0)), "in conflict...both hold u; remove one"),
     (lambda: held_twice(inclined, moved(u=0)), "in conflict...both hold u; remove one"),
     (
         lambda: joined(ub.Pinned(END), ub.Roller(THIRD.end)),
         "in conflict: Pinned at girder.end (1, 0) and Roller at third.end (1, 0) both hold v",
     ),
-    (
-        lambda: joined(ub.Roller(END, along=(2, 1)), moved(u=1.0)(TWIN.end)),
-        "Roller at girder.end...PrescribedDisplacement at twin.end...both hold u",
-    ),
     # friction pressed by a force that is not known
-    (
-        lambda: rubbed(HINGE),
-        "Turn(girder.end (1, 0), right.start (1, 0))...Revolute(...shares unknowns...multipliers",
-    ),
-    (lambda: rubbed(ub.Release(END, BESIDE, free="M")), "Release(...shares unknowns...multipliers"),
+    (lambda: rubbed(HINGE), "Turn(girder.end...Revolute(...shares unknowns...multipliers"),
     (lambda: rubbed(moved(psi=0.0)(GIRDER.start)), "girder.start...holds no displacement"),
     (
         lambda: rubbed(ub.Revolute(ub.ground(1, 0), END, BESIDE, multipliers=True)),
         "has more than two places, so that it has no single force; make a joint of two",
     ),
-    (
-        lambda: scene(
-            connectors=[
-                ub.Turn(
-                    ub.ground(1, 0), END, ub.Coulomb(coefficient=1.0, joint=ub.Pinned(GIRDER.start))
-                )
-            ]
-        ),
-        "Turn(ground (1, 0), girder.end (1, 0))...Pinned at girder.start...is not in the scene",
-    ),
+    (lambda: scene(connectors=[PRESSED]), "Turn(...Pinned at girder.start...is not in the scene"),
     # initial velocities
     (
         lambda: thrown(ub.Velocity([GIRDER], linear=(1, 0)), ub.Velocity([RIGHT], linear=(2, 0))),
         "Velocity: right gets two different velocities at (1, 0)...joined to",
     ),
-    (
-        lambda: thrown(ub.Velocity([GIRDER], angular=1.0), ub.Velocity([GIRDER])),
-        "Velocity: girder gets two different velocities at (0, 0)",
-    ),
-    (
-        lambda: ub.Simulation(ub.Scene([HALT]), ub.EnergyMomentum()),
-        "halt: zero length of a cell at",
-    ),
-]
-
-
-@pytest.mark.parametrize(("make", "says"), SCENES, ids=[says for _, says in SCENES])
-def test_a_message_says_why_a_scene_is_refused(make, says):
-    with raises(says):
-        make()
+    (lambda: run(ub.Scene([HALT])), "halt: zero length of a cell at"),
+]  # fmt: skip
 
 
 def test_supports_at_one_place_may_hold_different_displacements():
@@ -318,14 +242,11 @@ def test_supports_at_one_place_may_hold_different_displacements():
 
 def test_velocities_may_differ_where_they_agree_at_the_joint():
     # Both turn about the hinge, at different rates
-    turns = [
-        ub.Velocity([part], angular=rate, about=(1, 0))
-        for part, rate in ((GIRDER, 1.0), (RIGHT, -3.0))
-    ]
-    assert thrown(*turns).t == 0.0
+    rates = (GIRDER, 1.0), (RIGHT, -3.0)
+    assert thrown(*(ub.Velocity([x], angular=w, about=(1, 0)) for x, w in rates)).t == 0.0
 
 
-@pytest.mark.parametrize("free", ["M", "N", "V", "NV", "NM"])
+@pytest.mark.parametrize("free", ["M", "NV", "NM"])
 def test_a_release_with_multipliers_has_the_same_equilibrium(free):
     """Forces hold all that it transmits, its rotation too."""
     joint = ub.Release(END, BESIDE, free=free, multipliers=True)
@@ -341,15 +262,15 @@ def test_a_release_with_multipliers_has_the_same_equilibrium(free):
     np.testing.assert_allclose(motions[1], motions[0], rtol=1e-7, atol=1e-12)
 
 
-# -- mechanisms in statics -------------------------------------------------------------------------
-
-
 def static(model):
     return ub.Simulation(model, ub.Static())
 
 
 def in_line(joint, *supports):
     return ub.Scene([GIRDER, RIGHT], joints=[joint(END, BESIDE)], supports=supports)
+
+
+PINS = ub.Revolute, ub.Pinned(GIRDER.start), ub.Pinned(RIGHT.end)
 
 
 def portal(corner=ub.Revolute):
@@ -372,31 +293,20 @@ def chain(support, count=310):
     ("make", "says", "centers"),
     [
         (scene, "3 independent ways...girder (beam 0)...Add supports or joints...EnergyM", None),
-        (lambda: scene(supports=[ub.Roller(END)]), "2 independent ways...girder (beam 0)", None),
         (lambda: scene(supports=[ub.Pinned(GIRDER.start)]), "1 way", {"girder": (0, 0)}),
         (portal, "1 way...roof (beam 1) can shift along", {"left": (0, 0), "right": (6, 0)}),
         # the clamped girder is not named
         (lambda: in_line(ub.Revolute, ub.Clamped(GIRDER.start)), "1 way", {"right": (1, 0)}),
         # free at first order only, but statics starts there
-        (
-            lambda: in_line(ub.Revolute, ub.Pinned(GIRDER.start), ub.Pinned(RIGHT.end)),
-            "1 way",
-            {"girder": (0, 0), "right": (2, 0)},
-        ),
-        (
-            lambda: ub.Scene([beam((0, i), (1, i), name=f"b{i}") for i in range(7)]),
-            "21 independent ways",
-            None,
-        ),
+        (lambda: in_line(*PINS), "1 way", {"girder": (0, 0), "right": (2, 0)}),
         (lambda: chain(ub.Pinned), "1 way...; and 306 more", {f"b{i}": (0, 0) for i in range(4)}),
     ],
 )
 def test_a_message_names_the_beams_of_a_mechanism_and_their_centers(make, says, centers):
     with raises(f"free to move in {says}") as failure:
         static(make())
-    found = re.findall(
-        r"(\w+) \(beam \d+\) can turn about \(([^,]+), ([^)]+)\)", str(failure.value)
-    )
+    turning = r"(\w+) \(beam \d+\) can turn about \(([^,]+), ([^)]+)\)"
+    found = re.findall(turning, str(failure.value))
     if centers is not None:
         known = {name: pytest.approx(at, abs=1e-9) for name, at in centers.items()}
         assert {name: (float(x), float(y)) for name, x, y in found} == known
@@ -417,9 +327,6 @@ def test_a_frame_with_a_rigid_corner_or_a_clamp_is_no_mechanism():
     assert ub.Simulation(scene(), ub.EnergyMomentum()).t == 0.0  # dynamics needs no supports
 
 
-# -- runs and their results ------------------------------------------------------------------------
-
-
 HUB = ub.Body((3, 0), mass=1.0, inertia=1.0, name="hub")
 MASS = ub.PointMass(GIRDER.at(0.3), 1.0)  # makes a vertex there
 CLAMPED = scene(supports=[ub.Clamped(GIRDER.start)])
@@ -428,7 +335,6 @@ YIELDS = ub.Scene([YIELDING], supports=[ub.Clamped(YIELDING.start)])
 OF_OTHERS = "start: the solution has other beams or another mesh"
 RUNS = [
     (lambda: run(t=(1.0, 1.0)), "the end t[1] = 1 must come after the beginning 1"),
-    (lambda: run(t=1.0), "simulate: t = 1.0 must be a pair (beginning, end)"),
     (lambda: run(record=ub.History("a.csv", [STRAY.end])), "stray.end (1, 0): stray is not in the"),
     # the start
     (lambda: run(ub.Scene([TWIN]), start=run()), OF_OTHERS + "; use the same Beam objects"),
@@ -437,42 +343,33 @@ RUNS = [
     (lambda: run(scene(bodies=[HUB]), start=run()), "start: hub is not in the scene of the solut"),
     # results
     (lambda: run().displacement(STRAY.end), "stray.end (1, 0): stray is not in the scene"),
-    (lambda: run().position(STRAY.end), "stray.end (1, 0): stray is not in the scene"),
-    (lambda: run().section_forces_at(STRAY.end), "stray is not in the scene"),
     (lambda: run().section_forces(STRAY), "stray is not in the scene"),
-    (lambda: run().displacement(STRAY), "stray...is not a Place"),
     (lambda: run().reaction(ub.Clamped(STRAY.end)), "reaction: Clamped at stray.end...not in"),
     (lambda: run(CLAMPED, ub.Static()).velocity(END), "velocity: the run was static"),
     (lambda: run(CLAMPED, ub.Static()).momentum(), "momentum: the run was static"),
     (lambda: run().material(GIRDER), "material: no beam of the scene yields or breaks"),
-    (lambda: run().material_at(END), "material: no beam of the scene yields or breaks"),
     (lambda: run(YIELDS, ub.Static()).material(STRAY), "stray is not in the scene"),
-    (lambda: run(YIELDS, ub.Static()).material_at(STRAY.end), "stray...is not in the scene"),
 ]
 
 
-@pytest.mark.parametrize(("make", "says"), RUNS, ids=[says for _, says in RUNS])
-def test_a_message_says_why_a_run_or_a_question_is_refused(make, says):
+MESSAGES = [*PARTS, *SCENES, *RUNS]
+
+
+@pytest.mark.parametrize(("make", "says"), MESSAGES, ids=[says for _, says in MESSAGES])
+def test_a_message_says_why_something_is_refused(make, says):
     with raises(says):
         make()
 
 
-@pytest.mark.parametrize(
-    "recorder",
-    [lambda path: ub.XDMF(path.with_suffix(".xdmf")), lambda path: ub.History(path)],
-    ids=["XDMF", "History"],
-)
-def test_an_output_that_cannot_be_written_is_refused_before_the_run(recorder, shared_path):
-    missing = shared_path / "nowhere" / "out.csv"
+@pytest.mark.parametrize(("recorder", "name"), [(ub.XDMF, "a.xdmf"), (ub.History, "a.csv")])
+def test_an_output_that_cannot_be_written_is_refused_before_the_run(recorder, name, shared_path):
     with raises("output...nowhere...there is no directory...make it first"):
-        run(record=recorder(missing))
-    blocked = shared_path / "out.csv"
+        run(record=recorder(shared_path / "nowhere" / name))
     if MPI.COMM_WORLD.rank == 0:
-        blocked.mkdir()
-        blocked.with_suffix(".xdmf").mkdir()
+        (shared_path / name).mkdir()
     MPI.COMM_WORLD.barrier()
-    with raises("output...out...cannot be written...directory"):
-        run(record=[recorder(blocked)])
+    with raises("output...cannot be written...directory"):
+        run(record=[recorder(shared_path / name)])
 
 
 def test_a_refused_output_leaves_no_file(shared_path):
@@ -495,25 +392,17 @@ def test_a_start_with_a_new_joint_of_places_apart_is_refused():
     assert len(run(rigid, start=still).times) > 1
 
 
-class Pulse:
-    """A time function with equality and no hash, as a plain dataclass has."""
-
-    def __call__(self, t):
-        return 1.0
-
-    def __eq__(self, other):
-        return isinstance(other, Pulse)
-
-
-def test_whole_numbers_of_cells_may_be_floats():
-    assert len(run(ub.Scene([beam(cells=2.0)])).numbering.cells) == 2
-
-
 def test_time_functions_need_no_hash():
+    class Pulse:
+        """As a plain dataclass, which has equality and no hash."""
+
+        def __call__(self, t):
+            return 1.0
+
+        def __eq__(self, other):
+            return isinstance(other, Pulse)
+
     run(scene(loads=[push(Pulse())]))  # no error is raised
-
-
-# -- options of PETSc -----------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -543,7 +432,6 @@ def test_wrong_petsc_options_do_no_harm_to_the_next_run(database):
     [
         ("snes_monitr", "option ub_snes_monitr; did you mean ub_snes_monitor"),
         ("snes_tr_delta0", "option ub_snes_tr_delta0; "),  # of another method
-        ("tolerance", "option ub_tolerance; leave it out"),
     ],
 )
 def test_an_option_without_effect_is_refused(database, name, said):

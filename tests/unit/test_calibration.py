@@ -7,12 +7,14 @@ to round-off, so that estimates and covariances have closed forms.
 
 import contextlib
 import warnings
+from types import SimpleNamespace
 
 from mpi4py import MPI
 
 import numpy as np
 import pytest
 from helpers import raises
+from scenes import clamped
 from scipy.stats import norm, t
 
 import ufl_beam as ub
@@ -30,7 +32,7 @@ def pushed(a, b, factor=1.0):
         ub.PointLoad(beam.end, force=(factor * a, 0), amplitude=lambda s: s),
         ub.PointLoad(beam.end, force=(factor * b, 0), amplitude=lambda s: s * s),
     )
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=forces)
+    return clamped(beam, loads=forces)
 
 
 def force(run):
@@ -40,6 +42,14 @@ def force(run):
 
 def truth(a=2.0, b=-3.0, factor=1.0, times=TIMES):
     return factor * (a * times + b * times**2)
+
+
+def single(a):
+    return pushed(a, 0.0)
+
+
+def tip(run):
+    return run.displacement(run.scene["beam"].end)[:, 1]
 
 
 def measurement(values=None, *, times=TIMES, seed=0, **options):
@@ -81,9 +91,8 @@ def test_estimates_and_covariance_of_a_linear_problem_are_those_of_least_squares
     # Derivatives are differences with the round-off of runs, 1e-12, over the step 2**-16.
     np.testing.assert_allclose(known.covariance, covariance, rtol=1e-6)
     deviations = np.sqrt(covariance.diagonal())
-    np.testing.assert_allclose(
-        known.correlations, covariance / np.outer(deviations, deviations), rtol=1e-6
-    )
+    correlations = covariance / np.outer(deviations, deviations)
+    np.testing.assert_allclose(known.correlations, correlations, rtol=1e-6)
     rest = y - A @ best
     np.testing.assert_allclose(known.residuals[0], rest, atol=1e-8)
     assert known.cost == pytest.approx(0.5 * np.sum(rest**2) / SIGMA**2)
@@ -98,6 +107,9 @@ def test_estimates_and_covariance_of_a_linear_problem_are_those_of_least_squares
         np.testing.assert_allclose(result.half_widths, half, rtol=1e-6)
         for (low, high), p, w in zip(result.intervals.values(), best, half, strict=True):
             np.testing.assert_allclose((low, high), (p - w, p + w), rtol=1e-6)
+    exact = fit(measurement(truth()))  # without errors
+    np.testing.assert_allclose([*exact.parameters.values()], [2.0, -3.0], rtol=1e-6)
+    assert exact.cost < len(TIMES)
     # no warning is issued
 
 
@@ -130,31 +142,20 @@ def test_weights_of_several_measurements_agree_with_their_estimated_deviations()
     assert result.identified_by == {"a": "measurement", "b": "measurement"}
 
 
-def peaks(a, b):
-    """Two measured numbers that the fit of two parameters can meet."""
-
-    def numbers(run):
-        return force(run)[[20, 40]]
-
-    values = np.array([a * 0.5 + b * 0.25, a + b])
-    return measurement(values, times=None, quantity=numbers, name="peaks")
-
-
 def test_too_few_values_for_an_estimate_of_their_deviation_are_refused():
     """Without a refusal the fit would go through them, and their deviation would become 1e-9."""
-    one = measurement([-1.2], times=None, quantity=lambda run: force(run)[-1], name="peak")
-    with raises("peak has 1 value, too few to estimate a standard deviation", "sigma="):
-        fit([measurement(), one])
-    with raises("peaks has 2 values, too few to estimate a standard deviation", "sigma="):
-        fit([measurement(sigma=1.0), peaks(2.1, -3.2)])
+    for values, at in (([-1.2], [-1]), ([-0.2, -1.1], [20, 40])):
+        numbers = {"times": None, "quantity": lambda run, at=at: force(run)[at]}
+        few = measurement(values, name="few", **numbers)
+        words = f"few has {len(at)} value", ", too few to estimate a standard deviation", "sigma="
+        with raises(*words):
+            fit([measurement(sigma=1.0), few])
 
 
 def test_intervals_of_positive_parameters_are_symmetric_in_their_logarithm():
     values, times = np.exp([0.1, -0.1, 0.05]) * [0.5, 1.0, 1.5], np.array([0.5, 1.0, 1.5])
-    result = fit(
-        measurement(values, times=times, t=(0, 2), dt=0.5, sigma=0.1),
-        {"a": 3.0}, lambda a: pushed(a, 0.0),
-    )  # fmt: skip
+    measured = measurement(values, times=times, t=(0, 2), dt=0.5, sigma=0.1)
+    result = fit(measured, {"a": 3.0}, single)
     a = times @ values / (times @ times)  # the force is a t
     assert result.parameters["a"] == pytest.approx(a)
     w = norm.ppf(0.975) * 0.1 / np.linalg.norm(times) / a
@@ -162,11 +163,8 @@ def test_intervals_of_positive_parameters_are_symmetric_in_their_logarithm():
     assert result.half_widths[0] == pytest.approx(w * a)
 
 
-class Stored:
+class Stored(SimpleNamespace):
     """A run with stored times alone."""
-
-    def __init__(self, times):
-        self.times = times
 
     def __len__(self):
         return len(self.times)
@@ -175,7 +173,7 @@ class Stored:
 def interpolated(at, times, values):
     """Computed values at measured times, from a history at stored times."""
     options = {"quantity": lambda run: values, "t": (times[0], times[-1])}
-    return measurement(np.zeros(len(at)), times=at, **options).computed(Stored(times))
+    return measurement(np.zeros(len(at)), times=at, **options).computed(Stored(times=times))
 
 
 def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
@@ -185,6 +183,8 @@ def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
     np.testing.assert_allclose(interpolated(at, times, cubic(times)), cubic(at), atol=1e-14)
     stored = np.exp(times)
     np.testing.assert_allclose(interpolated(times, times, stored), stored, rtol=1e-15)
+    at_end = measurement(np.zeros(3), times=np.arange(1, 4) * 0.1, t=(0, 0.3), dt=0.1)
+    assert at_end.times[-1] == 0.3  # 3 times 0.1 is above it
     two = times[:2]
     assert interpolated([0.025], two, two) == pytest.approx([0.025])  # two times: a line
     h = np.array([0.02, 0.01])
@@ -198,31 +198,17 @@ def test_interpolation_is_exact_for_cubics_and_of_fourth_order():
 
 def test_interpolation_at_fourth_order_is_of_sixth_order():
     """Its error is below that of the steps; with four states it would be above it."""
-
-    def shaken(k):
-        section = ub.Section(EA=1e3, GA=1e3, EI=30.0, rhoA=1.0, rhoI=0.5)
-        beam = ub.Beam((0, 0), (3, 0), section, cells=1, name="beam")
-        load = ub.PointLoad(beam.end, force=(0, k), amplitude=lambda s: np.sin(s) ** 4)
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-
-    def tip(run):
-        return run.displacement(run.scene["beam"].end)[:, 1]
-
-    fourth = ub.EnergyMomentum(order=4)
-    options = {"quantity": tip, "scheme": fourth, "t": (0, 3)}
+    section = ub.Section(EA=1e3, GA=1e3, EI=30.0, rhoA=1.0, rhoI=0.5)
+    beam = ub.Beam((0, 0), (3, 0), section, cells=1, name="beam")
+    load = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda s: np.sin(s) ** 4)
+    scene, fourth = clamped(beam, loads=[load]), ub.EnergyMomentum(order=4)
     fine, coarse = (
-        ub.simulate(shaken(1.0), fourth, t=(0, 3), dt=dt, progress=False) for dt in (0.01, 0.1)
+        ub.simulate(scene, fourth, t=(0, 3), dt=dt, progress=False) for dt in (0.01, 0.1)
     )
-    at = measurement(np.zeros(301), times=fine.times, dt=0.1, **options)
+    options = {"quantity": tip, "scheme": fourth, "t": (0, 3), "dt": 0.1}
+    at = measurement(np.zeros(301), times=fine.times, **options)
     steps = np.abs(tip(coarse) - tip(fine)[::10]).max()
     assert np.abs(at.computed(coarse) - tip(fine)).max() < 1.5 * steps
-
-
-def test_a_time_outside_of_the_run_by_round_off_is_its_end():
-    """3 times 0.1 is above 0.3."""
-    times = np.arange(1, 4) * 0.1
-    assert times[-1] > 0.3
-    assert measurement([1.0, 2.0, 3.0], times=times, t=(0, 0.3), dt=0.1).times[-1] == 0.3
 
 
 def test_a_first_row_without_a_value_is_left_out():
@@ -232,7 +218,7 @@ def test_a_first_row_without_a_value_is_left_out():
     options = {"quantity": acceleration, "scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 1e-3}
     times = np.array([0.01, 0.02, 0.03])
     later = measurement([1.0, 2.0, 3.0], times=times, **options)
-    run = ub.simulate(pushed(2.0, 0.0), ub.EnergyMomentum(), t=(0, 0.1), dt=1e-3, progress=False)
+    run = ub.simulate(single(2.0), ub.EnergyMomentum(), t=(0, 0.1), dt=1e-3, progress=False)
     np.testing.assert_allclose(later.computed(run), acceleration(run)[[10, 20, 30]], rtol=1e-9)
     early = measurement([1.0, 2.0], times=[0.0, 0.1], **options)
     with raises("quantity returned nan at the beginning", "before 0.001"):
@@ -243,8 +229,7 @@ def test_values_without_times_are_compared_as_they_are():
     def at_end(run):
         return force(run)[-1]
 
-    result = fit(measurement([4.0], times=None, quantity=at_end, sigma=0.1), {"a": 1.0},
-                 lambda a: pushed(a, 0.0))  # fmt: skip
+    result = fit(measurement([4.0], times=None, quantity=at_end, sigma=0.1), {"a": 1.0}, single)
     assert result.parameters["a"] == pytest.approx(4.0)
     assert "measurement: 1 value, " in str(result)
     below = ub.plot(result).axes[1]
@@ -295,23 +280,14 @@ def rubbing(limit, hardening):
     rub = ub.Slide(ub.ground(2, 0), beam.end, ub.Coulomb(20.0), axis=(0, 1))
     push = ub.Table([0, 0.1, 0.2], [0, 1, 0])
     load = ub.PointLoad(beam.end, force=(0, -300.0), amplitude=push)
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], masses=[ub.PointMass(beam.end, 10.0)],
-        connectors=[rub], loads=[load],
-    )  # fmt: skip
-
-
-def tip(run):
-    return run.displacement(run.scene["beam"].end)[:, 1]
+    return clamped(beam, masses=[ub.PointMass(beam.end, 10.0)], connectors=[rub], loads=[load])
 
 
 @pytest.mark.parametrize("start", [{"limit": (250.0, 100, 500), "hardening": (300.0, 10, 5000)},
                                    {"limit": 250.0, "hardening": 400.0}])  # fmt: skip
 def test_a_search_goes_on_where_computed_values_jump(start):
     """They jump where friction sticks in another step; the cost there is 12 % above the least."""
-    options = {
-        "scheme": ub.EnergyMomentum(alpha=0.05, beta=0.05), "t": (0, 0.5), "dt": 2.5e-3,
-    }  # fmt: skip
+    options = {"scheme": ub.EnergyMomentum(0.05, 0.05), "t": (0, 0.5), "dt": 2.5e-3}
     run = ub.simulate(rubbing(300.0, 500.0), progress=False, **options)
     times, random = np.arange(0.01, 0.5, 0.01), np.random.default_rng(1)
     values = np.interp(times, run.times, tip(run))
@@ -323,58 +299,45 @@ def test_a_search_goes_on_where_computed_values_jump(start):
     assert np.sum(found.residuals[0] ** 2) < 9.5e-6
 
 
-def test_parameters_that_act_alike_are_named():
-    measured = measurement(truth(2.0, 0.0), sigma=SIGMA)
-    with warned("do not determine a and b: they have the same effect"):
-        result = fit(measured, {"a": 1.0, "b": 3.0}, lambda a, b: pushed(a * b, 0.0))
-    assert np.isinf(result.half_widths).all()
-    assert result.identified_by["a"] == "all together"
-    assert result.parameters["a"] * result.parameters["b"] == pytest.approx(2.0)
-    assert len(result.warnings) == 1
-    assert result.warnings[0] in str(result)
+@pytest.mark.parametrize(
+    ("words", "measured", "start", "model", "finite"),
+    [
+        ("do not determine a and b: they have the same effect",
+         measurement(truth(2.0, 0.0), sigma=SIGMA), {"a": 1.0, "b": 3.0},
+         lambda a, b: single(a * b), [False, False]),
+        ("hardly distinguish a and b: .* -1.0000",
+         measurement(truth(2.0, 0.03), sigma=1e-4), {"a": 1.2, "b": 0.8},
+         lambda a, b: pushed(a + b, 0.03 * b), [True, True]),
+        # The second force acts where the first one is above 2.5 N only
+        ("do not determine b: it has no effect",
+         measurement(truth(2.0, 0.0), sigma=SIGMA), {"a": 3.0, "b": 0.1},
+         lambda a, b: pushed(a, max(a - 2.5, 0.0) * b), [True, False]),
+        ("hardly determine a: its 95 % interval is",
+         measurement(sigma=10.0), {"a": 1.0}, single, [True]),
+    ],
+)  # fmt: skip
+def test_parameters_that_are_not_determined_are_named(words, measured, start, model, finite):
+    with warned(words):
+        result = fit(measured, start, model)
+    assert np.isfinite(result.half_widths).tolist() == finite
+    if not any(finite):
+        assert result.identified_by["a"] == "all together"
+        assert result.parameters["a"] * result.parameters["b"] == pytest.approx(2.0)
+        assert len(result.warnings) == 1
+        assert result.warnings[0] in str(result)
 
 
-def test_parameters_that_act_almost_alike_are_named():
-    def model(a, b):
-        return pushed(a + b, 0.03 * b)
-
-    with warned("hardly distinguish a and b: .* -1.0000"):
-        fit(measurement(truth(2.0, 0.03), sigma=1e-4), {"a": 1.2, "b": 0.8}, model)
-
-
-def test_a_parameter_without_effect_at_the_minimum_is_named():
-    """The second force acts where the first one is above 2.5 N only."""
-
-    def model(a, b):
-        return pushed(a, max(a - 2.5, 0.0) * b)
-
-    measured = measurement(truth(2.0, 0.0), sigma=SIGMA)
-    with warned("do not determine b: it has no effect"):
-        result = fit(measured, {"a": 3.0, "b": 0.1}, model)
-    assert np.isfinite(result.half_widths).tolist() == [True, False]
-
-
-def test_wide_intervals_and_bounds_are_named():
-    measured = measurement(sigma=10.0)
-    with warned("hardly determine a: its 95 % interval is"):
-        fit(measured, {"a": 1.0}, lambda a: pushed(a, 0.0))
-    with warned("a = 1.5 is at its upper bound"):
-        result = fit(measurement(truth(2.0, 0.0), sigma=SIGMA), {"a": (1.0, 0.5, 1.5)},
-                     lambda a: pushed(a, 0.0))  # fmt: skip
-    assert result.parameters["a"] == pytest.approx(1.5, rel=1e-4)
-    assert result.intervals["a"][1] <= 1.5
-
-
-def test_a_bound_on_one_side_holds():
+def test_bounds_hold_and_are_named():
     data = measurement(truth(2.0, 0.0), sigma=SIGMA)
-    ends = {(3.0, 2.5, None): 2.5, (1.0, None, 1.5): 1.5, (-3.0, None, -1.0): -1.0}
-    for entry, end in ends.items():
-        with warned(f"a = {end:g} is at its"):
-            result = fit(data, {"a": entry}, lambda a: pushed(a, 0.0))
+    for entry, side, end in (
+        ((1.0, 0.5, 1.5), "upper", 1.5), ((3.0, 2.5, None), "lower", 2.5),
+        ((1.0, None, 1.5), "upper", 1.5), ((-3.0, None, -1.0), "upper", -1.0),
+    ):  # fmt: skip
+        with warned(f"a = {end:g} is at its {side} bound"):
+            result = fit(data, {"a": entry}, single)
         assert result.parameters["a"] == pytest.approx(end, rel=1e-3)
-    assert fit(data, {"a": (1.0, 0.0, None)}, lambda a: pushed(a, 0.0)).warnings == ()
-    with raises("parameters['a']: 1 is not between the bounds 2 and inf"):
-        fit(data, {"a": (1.0, 2.0, None)}, lambda a: pushed(a, 0.0))
+        assert side == "lower" or result.intervals["a"][1] <= end
+    assert fit(data, {"a": (1.0, 0.0, None)}, single).warnings == ()
 
 
 def test_failed_runs_shorten_the_step_of_the_search():
@@ -383,8 +346,7 @@ def test_failed_runs_shorten_the_step_of_the_search():
 
     def model(a):
         beam = ub.Beam((0, 0), (1, 0), STEEL, cells=4, name="beam", hinges={0.0: law})
-        loads = [ub.PointLoad(beam.end, force=(0, -a), amplitude=lambda s: s)]
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
+        return clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, -a), amplitude=lambda s: s)])
 
     def moment(run):
         return run.reaction(run.scene.supports[0])[:, 2]
@@ -401,12 +363,6 @@ def test_failed_runs_shorten_the_step_of_the_search():
         fit(measured, {"a": 50.0}, model)
 
 
-def test_data_without_errors_are_met():
-    result = fit(measurement(truth()))
-    np.testing.assert_allclose([*result.parameters.values()], [2.0, -3.0], rtol=1e-6)
-    assert result.cost < len(TIMES)
-
-
 def test_warnings_of_runs_in_the_search_are_not_repeated():
     def model(a, b):
         warnings.warn("odd", ub.ModelWarning, stacklevel=1)
@@ -420,15 +376,8 @@ def test_warnings_of_runs_in_the_search_are_not_repeated():
 def test_results_are_shown_as_text_table_and_picture():
     result = fit([measurement(sigma=SIGMA, name="first"), measurement(seed=1, name="second")])
     assert repr(result).startswith("<Calibration: 2 parameters, 2 measurements, ")
-    text = str(result)
-    for words in (
-        "95 % interval",
-        "± by first",
-        "correlations: b, a -0.9",
-        "0.1 (given)",
-        "(estim",
-    ):
-        assert words in text
+    parts = "95 % interval", "± by first", "correlations: b, a -0.9", "0.1 (given)", "(estim"
+    assert all(part in str(result) for part in parts)
     page = result._repr_html_()
     assert "<table>" in page
     assert 'alt="measured and computed values"' in page
@@ -443,23 +392,14 @@ def test_results_are_shown_as_text_table_and_picture():
     ("words", "options"),
     [
         (("times[1] = 1.5 is outside the run from 0 to 1",), {"times": [0.5, 1.5]}),
-        (("times[0] = -0.5 is outside",), {"times": [-0.5, 0.5]}),
         (("times must increase", "0.5 follows 0.5"), {"times": [0.5, 0.5]}),
         (("3 times and 2 values",), {"times": [0.1, 0.2, 0.3]}),
         (("values[1]", "not finite"), {"values": [1.0, np.nan]}),
         (("values is empty",), {"times": [], "values": []}),
-        (("sigma", "must be positive"), {"sigma": 0.0}),
         (("sigma must be a positive number, or one for each",), {"sigma": [1.0, -1.0]}),
         (("sigma has 3 standard deviations for 2 values",), {"sigma": [1.0, 1.0, 1.0]}),
-        (("quantity", "must be a function"), {"quantity": 1.0}),
-        (("scheme",), {"scheme": "static"}),
         (("must come after",), {"t": (1, 0)}),
-        (("dt", "must be positive"), {"dt": 0.0}),
         (("dt", "not a number"), {"dt": ub.Adaptive(1e-3)}),
-        (("labels", "two texts"), {"labels": ("time",)}),
-        (("arguments",), {"arguments": 1}),
-        (("mesh",), {"mesh": 1}),
-        (("newton",), {"newton": 1}),
     ],
 )
 def test_wrong_measurements_are_refused(words, options):
@@ -478,21 +418,16 @@ def test_wrong_measurements_are_refused(words, options):
          {"parameters": {**WITHIN, "factor": 1.0},
           "measured": measurement(arguments={"factor": 2.0})}),
         (("parameters is empty",), {"parameters": {}}),
-        (("parameters",), {"parameters": [1.0]}),
         (("parameters['a'] = (1.0, 2.0)", "(start, lower, upper)"),
          {"parameters": {"a": (1.0, 2.0), "b": 1.0}}),
-        (("parameters['a']: 3 is not between the bounds 1 and 2",),
-         {"parameters": {"a": (3.0, 1.0, 2.0), "b": 1.0}}),
+        (("parameters['a']: 1 is not between the bounds 2 and inf",),
+         {"parameters": {"a": (1.0, 2.0, None), "b": 1.0}}),
         (("parameters['a'] = 0 has no scale",), {"parameters": {"a": 0.0, "b": 1.0}}),
         (("2 measured values are too few for 2 parameters and a standard deviation",),
          {"measured": measurement([1.0, 2.0], times=[0.5, 1.0])}),
         (("1 measured values are too few for 2 parameters;",),
          {"measured": measurement([1.0], times=[0.5], sigma=1.0)}),
-        (("measured[0]", "not a Measurement"), {"measured": [1.0]}),
         (("5 starts need bounds of b",), {"parameters": {**WITHIN, "b": 1.0}, "starts": 5}),
-        (("starts",), {"starts": 0}),
-        (("seed",), {"seed": -1}),
-        (("model",), {"model": 1}),
     ],
 )  # fmt: skip
 def test_wrong_calls_are_refused_before_any_run(words, options):
@@ -508,11 +443,6 @@ def test_wrong_calls_are_refused_before_any_run(words, options):
     assert not runs
 
 
-def test_parameters_without_effect_are_refused_before_the_search():
-    with raises("the parameter b has no effect on the computed values at its start"):
-        fit(measurement(), model=lambda a, b: pushed(a, 0.0))
-
-
 @pytest.mark.parametrize(
     ("words", "quantity"),
     [
@@ -525,3 +455,8 @@ def test_parameters_without_effect_are_refused_before_the_search():
 def test_wrong_quantities_are_named(words, quantity):
     with raises("Measurement measurement: quantity", *words):
         fit(measurement(quantity=quantity))
+
+
+def test_parameters_without_effect_are_refused_before_the_search():
+    with raises("the parameter b has no effect on the computed values at its start"):
+        fit(measurement(), model=lambda a, b: single(a))

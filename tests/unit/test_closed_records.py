@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import pytest
+from helpers import raises, run
 from scenes import clamped
 
 import ufl_beam as ub
@@ -21,7 +22,7 @@ CLOSED = [
 
 @pytest.mark.parametrize("kind", CLOSED, ids=lambda kind: kind.__name__)
 def test_no_subclass_is_ignored(kind):
-    with pytest.raises(ub.ArgumentError, match=f"Mine: {kind.__name__} has no subclasses"):
+    with raises(f"Mine: {kind.__name__} has no subclasses"):
         dataclass(frozen=True)(type("Mine", (kind,), {"__annotations__": {"more": float}}))
 
 
@@ -43,30 +44,21 @@ class Saturating(ub.ElastoPlastic):
 
 
 @pytest.mark.parametrize("reference", [False, True])
-@pytest.mark.parametrize("more", [0.0, 500.0])
-def test_a_subclass_of_hardening_is_followed(more, reference):
+def test_a_subclass_of_hardening_is_followed(reference):
     """[closed] A bar of EA = 1000 beyond its limit of 1 has the slope EA H/(EA + H)."""
-    section = ub.Section(EA=1e3, GA=1e3, EI=1.0, axial=Saturating(1.0, more=more))
+    section = ub.Section(EA=1e3, GA=1e3, EI=1.0, axial=Saturating(1.0, more=500.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.01 * t, v=0.0, psi=0.0)
-    scene = clamped(beam, pull)
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=newton)
-    force = 1.0 + 1e3 * more / (1e3 + more) * (0.01 - 0.001)
-    assert run.section_forces_at(beam.start)[-1, 0] == pytest.approx(force, rel=1e-9)
+    found = run(clamped(beam, pull), ub.Static(), dt=0.25, newton=newton)
+    force = 1.0 + 1e3 * 500 / (1e3 + 500) * (0.01 - 0.001)
+    assert found.section_forces_at(beam.start)[-1, 0] == pytest.approx(force, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda law: ub.Beam((0, 0), (1, 0), ub.Section(EA=1, GA=1, EI=1), hinges={0.5: law}),
-        ub.RigidPlastic,
-    ],
-    ids=["hinge", "connector"],
-)
-def test_a_hinge_of_zero_length_refuses_it(make):
+def test_a_hinge_of_zero_length_refuses_it():
     """Its equations are those of ElastoPlastic."""
-    with pytest.raises(
-        ub.ArgumentError, match="Saturating is a subclass of ElastoPlastic, and a hinge"
-    ):
-        make(Saturating(1.0, more=1.0))
+    law, section = Saturating(1.0, more=1.0), ub.Section(EA=1, GA=1, EI=1)
+    with raises("Saturating is a subclass of ElastoPlastic, and a hinge"):
+        ub.Beam((0, 0), (1, 0), section, hinges={0.5: law})
+    with raises("Saturating is a subclass of ElastoPlastic, and a hinge"):
+        ub.RigidPlastic(law)

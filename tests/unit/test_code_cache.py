@@ -50,51 +50,12 @@ class Builds:
         return self.count
 
 
-def cut(entry):
-    os.truncate(entry / "library.so", 1000)
-
-
-def empty(entry):
-    os.truncate(entry / "library.so", 0)
-
-
-def zeros(entry):
-    content = (entry / "library.so").read_bytes()
-    (entry / "library.so").write_bytes(content[:8192] + bytes(len(content) - 8192))
-
-
-def words(entry):
-    (entry / "library.so").write_text("hello\n")
-
-
-def gone(entry):
-    (entry / "library.so").unlink()
-
-
-def a_directory(entry):
-    gone(entry)
-    (entry / "library.so").mkdir()
-
-
-def no_source(entry):
-    (entry / "source.c").unlink()
-
-
-def an_empty_source(entry):
-    os.truncate(entry / "source.c", 0)
-
-
-def no_checksums(entry):
-    (entry / CHECKSUMS).unlink()
-
-
-def binary_checksums(entry):
-    (entry / CHECKSUMS).write_bytes(b"\xff\xfe\x00")
-
-
-def exchanged(entry):
-    Builds(2)("numbers_other")
-    shutil.copy(entry.parent / "numbers_other" / "library.so", entry / "library.so")
+@pytest.fixture
+def built(place):
+    """An entry that was built."""
+    builds = Builds()
+    assert [builds(), builds()] == [1, 1]
+    return builds
 
 
 def another_entry(entry):
@@ -114,40 +75,36 @@ def a_link(entry):
     (entry / "library.so").symlink_to(elsewhere)
 
 
-DAMAGES = [
-    *(cut, empty, zeros, words, gone, a_directory, no_source, an_empty_source),
-    *(no_checksums, binary_checksums, exchanged, another_entry, a_file, a_link),
-]
+DAMAGES = {
+    "cut": lambda entry: os.truncate(entry / "library.so", 1000),
+    "gone": lambda entry: (entry / "library.so").unlink(),
+    "no checksums": lambda entry: (entry / CHECKSUMS).unlink(),
+    "binary checksums": lambda entry: (entry / CHECKSUMS).write_bytes(b"\xff\xfe\x00"),
+    **{f.__name__: f for f in (another_entry, a_file, a_link)},
+}
 
 
-@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
-def test_what_is_damaged_is_built_again_and_not_loaded(place, damage):
-    builds = Builds()
-    assert [builds(), builds()] == [1, 1]
-    damage(place / ENTRY)
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_what_is_damaged_is_built_again_and_not_loaded(place, built, damage):
+    DAMAGES[damage](place / ENTRY)
     assert not intact(place / ENTRY)
-    assert [builds(), builds()] == [2, 2]
+    assert [built(), built()] == [2, 2]
     assert not list(place.glob("*.part"))
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root gives files away")
 @pytest.mark.parametrize("file", ["library.so", CHECKSUMS])
-def test_what_another_user_owns_is_built_again(place, file):
-    builds = Builds()
-    builds()
+def test_what_another_user_owns_is_built_again(place, built, file):
     os.chown(place / ENTRY / file, 1234, 1234)
-    assert [builds(), builds()] == [2, 2]
+    assert [built(), built()] == [2, 2]
 
 
-def test_a_library_of_another_system_is_built_again(place):
-    builds = Builds()
-    builds()
-
+def test_a_library_of_another_system_is_built_again(built):
     def load(directory):
         raise ImportError("undefined symbol")
 
-    assert cached(ENTRY, builds.build, load)[0] == 1
-    assert builds.count == 2
+    assert cached(ENTRY, built.build, load)[0] == 1
+    assert built.count == 2
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError])
@@ -162,23 +119,23 @@ def test_a_build_that_is_stopped_leaves_nothing(place, stop):
     assert Builds()() == 1
 
 
+def answer(number):
+    """Call a real module that returns a number."""
+    source = f"int answer(void) {{ return {number}; }}"
+    options = {"depends_on": [source], "flags": []}
+    module = jit.compiled("ufl_beam_test", "int answer(void);", lambda: source, **options)
+    return module.lib.answer()
+
+
 def test_damaged_c_is_compiled_again(place):
     """On a real library: loaded as it is, it would end this process."""
-
-    def answer():
-        module = jit.compiled(
-            *("ufl_beam_test", "int answer(void);", lambda: "int answer(void) { return 42; }"),
-            **{"depends_on": [], "flags": []},
-        )
-        return module.lib.answer()
-
-    assert answer() == 42
+    assert answer(42) == 42
     (entry,) = (path for path in place.iterdir() if path.is_dir())
     (library,) = entry.glob("*.so")
     content = library.read_bytes()
     library.unlink()  # this process has mapped it
     library.write_bytes(content[:1000])
-    assert answer() == 42
+    assert answer(42) == 42
     assert len(library.read_bytes()) == len(content)
     assert intact(entry)
 
@@ -214,6 +171,10 @@ code_cache.cached("slow", build, lambda directory: None)
 """
 
 
+def start(place, seconds):
+    return subprocess.Popen([sys.executable, "-c", BUILD, str(place), str(seconds)])
+
+
 def begun(place):
     """Wait until a build has begun."""
     for _ in range(4000):
@@ -223,20 +184,15 @@ def begun(place):
     pytest.fail("no build has begun")
 
 
-def start(place, seconds):
-    return subprocess.Popen([sys.executable, "-c", BUILD, str(place), str(seconds)])
-
-
 @pytest.mark.serial
-@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGINT])
 def test_a_killed_build_is_in_nobodys_way(place, by):
     process = start(place, 100)
     begun(place)
     process.send_signal(by)
     assert process.wait(20) != 0
     before = time.perf_counter()
-    builds = Builds()
-    assert builds("slow") == 1
+    assert Builds()("slow") == 1
     assert time.perf_counter() - before < 5  # FFCx waits 10 s
     assert sorted(path.name for path in place.iterdir()) == ["slow", "slow.lock"]
 
@@ -250,40 +206,6 @@ def test_two_processes_build_the_same_once_and_different_entries_at_once(place):
     assert processes[0].poll() is None
     assert [process.wait(30) for process in processes] == [0, 0]
     assert (place.parent / "log").read_text() == "built\n"
-
-
-FORM = """
-import sys
-from pathlib import Path
-from ufl_beam.compiled import code_cache, jit
-from ufl_beam.dolfinx_compat import fem, line_mesh
-import numpy as np, ufl
-place = Path(sys.argv[1])
-code_cache._place = lambda: place
-mesh = line_mesh(np.array([[0.0, 0], [1, 0]]), np.array([[0, 1]]))
-v = ufl.TestFunction(fem.functionspace(mesh, ("DG", 0)))
-form = 7.0 * v * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
-print(jit.compiled_form(form)[1].exists())
-"""
-
-
-@pytest.mark.serial
-def test_a_kill_while_ffcx_compiles(place):
-    command = [sys.executable, "-c", FORM, str(place)]
-    process = subprocess.Popen(command)
-    for _ in range(4000):
-        if list(place.glob("form_*.part/new/libffcx*.c")):
-            break
-        time.sleep(0.005)
-    process.kill()
-    process.wait()
-    assert not list(place.glob("form_*[0-9a-f]/" + CHECKSUMS))
-    again = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert again.stdout == "True\n", again.stderr
-    assert not list(place.glob("*.part"))
-
-
-# -- directories ---------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -310,28 +232,9 @@ def test_the_directory_is_private(home):
     assert (home / "ufl_beam").stat().st_mode & 0o777 == 0o700
 
 
-def open_to_all(home):
-    (home / "ufl_beam").mkdir(parents=True)
-    (home / "ufl_beam").chmod(0o777)
-
-
-def open_to_the_group(home):
-    (home / "ufl_beam").mkdir(parents=True)
-    (home / "ufl_beam").chmod(0o770)
-
-
-def open_above(home):
-    home.mkdir(parents=True)
-    home.chmod(0o777)
-
-
-def not_a_directory(home):
-    home.parent.mkdir()
-    home.write_text("")
-
-
-def a_file_above(home):
-    home.parent.write_text("")
+def open_to(directory, mode):
+    directory.mkdir(parents=True)
+    directory.chmod(mode)
 
 
 def a_link_elsewhere(home):
@@ -343,55 +246,33 @@ def a_link_elsewhere(home):
 @pytest.mark.parametrize(
     ("make", "why"),
     [
-        (open_to_all, "others may write to it"),
-        (open_to_the_group, "others may write to it"),
-        (open_above, "others may write to .*fenics"),
-        (not_a_directory, "Not a directory"),
-        (a_file_above, "Not a directory"),
+        (lambda home: open_to(home / "ufl_beam", 0o770), "others may write to it"),
+        (lambda home: open_to(home, 0o777), "others may write to .*fenics"),
+        (lambda home: home.parent.write_text(""), "Not a directory"),
         (a_link_elsewhere, "it is no directory"),
     ],
-    ids=lambda one: getattr(one, "__name__", ""),
+    ids=["group", "above", "file", "link"],
 )
 def test_directories_that_cannot_be_trusted_or_made(home, make, why):
     make(home)
     with pytest.warns(RuntimeWarning, match=f"cannot be used: {why}.*XDG_CACHE_HOME"):
         place = chosen()
-    assert place == Path(code_cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
+    temporary = Path(code_cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
+    assert place == temporary
     assert place.stat().st_mode & 0o777 == 0o700
+    temporary.chmod(0o777)  # a directory of another in its place
+    with pytest.warns(RuntimeWarning, match="cannot be used"):
+        assert chosen() != temporary
 
 
 @first_rank_says
-def test_a_home_that_cannot_be_written_to(home, monkeypatch):
-    """Nobody, not even root, makes directories in /sys; `import ufl_beam` used to be enough."""
-    if not Path("/sys").is_dir():
-        pytest.skip("there is no /sys")
-    monkeypatch.setattr(code_cache, "jit_directory", lambda: Path("/sys/.cache/fenics"))
-    with pytest.warns(RuntimeWarning, match="the cache /sys/.* cannot be used: .*XDG_CACHE_HOME"):
-        assert chosen().parent == Path(code_cache.tempfile.tempdir)
-
-
-@first_rank_says
-def test_a_cache_that_cannot_be_written_to_is_read(place, home, monkeypatch):
-    builds = Builds()
-    builds()
+def test_a_cache_that_cannot_be_written_to_is_read(place, built, home, monkeypatch):
     # For root everything is writable.
     monkeypatch.setattr(code_cache.os, "access", lambda *_: False)
-    assert builds() == 1
+    assert built() == 1
     with pytest.warns(RuntimeWarning, match="cannot be written to.*ufl_beam-"):
         assert Builds(3)("another") == 1
     assert [path.name for path in place.iterdir() if path.is_dir()] == [ENTRY]
-
-
-@first_rank_says
-def test_a_directory_of_another_in_the_place_of_temporary_files(home):
-    open_to_all(home)
-    other = Path(code_cache.tempfile.tempdir) / f"ufl_beam-{os.geteuid()}"
-    other.mkdir()
-    other.chmod(0o777)
-    with pytest.warns(RuntimeWarning, match="others may write"):
-        place = chosen()
-    assert place.parent == other.parent
-    assert place != other
 
 
 WARNS = "import ufl_beam, warnings; warnings.warn('is it seen?', RuntimeWarning)"
@@ -400,30 +281,23 @@ LOG = "import logging; logging.basicConfig(format='log: %(message)s'); "
 
 @pytest.mark.serial
 @pytest.mark.parametrize(
-    ("before", "options"),
-    [("", []), ("import dolfinx; ", ["-W", "always"]), (LOG, ["-W", "always"])],
-    ids=["", "always, after dolfinx", "always, after logging"],
+    ("before", "options", "seen"),
+    [
+        ("", [], "RuntimeWarning: is it seen?"),
+        # Some come before FFCx is there, for which Python adds a handler that shows nothing
+        (LOG, ["-W", "always"], "RuntimeWarning: is it seen?"),
+        (LOG + "logging.captureWarnings(True); ", [], "log: <string>:1: RuntimeWarning: is it"),
+    ],
+    ids=["", "always, after logging", "logged"],
 )
-def test_warnings_are_seen(before, options):
+def test_warnings_are_seen(before, options, seen):
     """FFCx 0.9 has all of them logged, which without a handler is nowhere.
 
-    With ``-W always`` some come before FFCx is there, for which Python adds a handler that shows
-    nothing.
+    They are logged if the user asks for it.
     """
     command = [sys.executable, *options, "-c", before + WARNS]
     run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    assert "RuntimeWarning: is it seen?" in run.stderr
-
-
-@pytest.mark.serial
-def test_warnings_are_logged_if_the_user_asks_for_it():
-    """FFCx 0.9 asks for it itself, later ones leave it to the user."""
-    command = [sys.executable, "-c", LOG + "logging.captureWarnings(True); " + WARNS]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    assert run.stderr.startswith("log: <string>:1: RuntimeWarning: is it seen?")
-
-
-# -- compilers -----------------------------------------------------------------------------------
+    assert seen in run.stderr
 
 
 def test_without_a_compiler_there_are_words(place, monkeypatch):
@@ -441,13 +315,11 @@ def test_a_kernel_without_vectors_is_remembered(place, tmp_path):
     assert len([path for path in place.iterdir() if path.is_dir()]) == 1
 
 
-# -- what was not used for long --------------------------------------------------------------------
-
-
-def aged(path, days):
-    """Let a file be so old."""
+def aged(days, *paths):
+    """Let files be so old."""
     then = time.time() - days * code_cache.DAY
-    os.utime(path, (then, then))
+    for path in paths:
+        os.utime(path, (then, then))
 
 
 def entries(place):
@@ -458,64 +330,48 @@ def test_what_was_not_used_for_a_month_is_removed_once_a_day(place):
     builds = {name: Builds() for name in ("old_1", "used_2", "new_3")}
     for name, build in builds.items():
         build(name)
-    for name, days in (("old_1", 31), ("used_2", 29)):
-        aged(place / name / CHECKSUMS, days)
-        aged(place / f"{name}.lock", 99)
-    aged(place / "new_3.lock", 99)
+        aged(99, place / f"{name}.lock")
+    aged(31, place / "old_1" / CHECKSUMS)
+    aged(29, place / "used_2" / CHECKSUMS)
     (place / "old_1.rest.part").mkdir()  # of a process that was killed
     (place / "gone_4.lock").touch()
-    aged(place / "gone_4.lock", 31)
+    aged(31, place / "gone_4.lock")
     code_cache.clean_up(place)
     assert entries(place) == ["new_3", "new_3.lock", "used_2", "used_2.lock"]
-    for name, count in (("old_1", 2), ("used_2", 1), ("new_3", 1)):
-        assert builds[name](name) == count
+    assert [build(name) for name, build in builds.items()] == [2, 1, 1]
     # On the same day nothing is looked for
-    aged(place / "new_3" / CHECKSUMS, 31)
+    aged(31, place / "new_3" / CHECKSUMS)
     code_cache.clean_up(place)
     assert (place / "new_3").exists()
-    aged(place / code_cache.CLEANED, 2)
+    aged(2, place / code_cache.CLEANED)
     code_cache.clean_up(place)
     assert not (place / "new_3").exists()
 
 
 def test_a_module_of_an_earlier_version_is_ignored_and_removed(place):
-    def answer(number):
-        source = f"int answer(void) {{ return {number}; }}"
-        module = jit.compiled(
-            *("ufl_beam_test", "int answer(void);", lambda: source),
-            **{"depends_on": [source], "flags": []},
-        )
-        return module.lib.answer()
-
     assert answer(1) == 1
     (earlier,) = (name for name in entries(place) if not name.endswith(".lock"))
     assert answer(2) == 2
     assert len(entries(place)) == 4
-    aged(place / earlier / CHECKSUMS, 31)
-    for lock in place.glob("*.lock"):
-        aged(lock, 31)
+    aged(31, place / earlier / CHECKSUMS, *place.glob("*.lock"))
     code_cache.clean_up(place)
     assert len(entries(place)) == 2
     assert not (place / earlier).exists()
     assert answer(2) == 2
 
 
-def test_a_use_is_noted_once_a_day(place):
-    build = Builds()
-    build()
+def test_a_use_is_noted_once_a_day(place, built):
     for days, noted in ((0.5, False), (2.0, True)):
-        aged(place / ENTRY / CHECKSUMS, days)
+        aged(days, place / ENTRY / CHECKSUMS)
         before = (place / ENTRY / CHECKSUMS).stat().st_mtime
-        assert build() == 1
+        assert built() == 1
         assert ((place / ENTRY / CHECKSUMS).stat().st_mtime != before) == noted
 
 
-def test_what_is_used_while_it_is_removed_stays(place, monkeypatch):
+def test_what_is_used_while_it_is_removed_stays(place, built, monkeypatch):
     """Another process finds it between the two looks at its age."""
-    build, age = Builds(), code_cache._age
-    build()
-    for path in (place / ENTRY / CHECKSUMS, place / f"{ENTRY}.lock"):
-        aged(path, 31)
+    age = code_cache._age
+    aged(31, place / ENTRY / CHECKSUMS, place / f"{ENTRY}.lock")
 
     def used(path):
         found = age(path)
@@ -526,34 +382,29 @@ def test_what_is_used_while_it_is_removed_stays(place, monkeypatch):
     monkeypatch.setattr(code_cache, "_age", used)
     code_cache.clean_up(place)
     assert entries(place) == [ENTRY, f"{ENTRY}.lock"]
-    assert build() == 1
+    assert built() == 1
 
 
-def test_what_is_removed_while_it_is_loaded_is_built_again(place):
-    build = Builds()
-    build()
-    load = build.load
+def test_what_is_removed_while_it_is_loaded_is_built_again(built):
+    load = built.load
 
     def removed(directory):
-        build.load = load
+        built.load = load
         for path in (directory / CHECKSUMS, directory / "library.so"):
             path.unlink()
         return load(directory)
 
-    build.load = removed
-    assert build() == 2
+    built.load = removed
+    assert built() == 2
 
 
-def test_a_cache_that_cannot_be_written_is_not_swept(place, monkeypatch):
+def test_a_cache_that_cannot_be_written_is_not_swept(place, built, monkeypatch):
     def refuse(*_, **__):
         raise PermissionError
 
-    build = Builds()
-    build()
-    for path in (place / ENTRY / CHECKSUMS, place / f"{ENTRY}.lock"):
-        aged(path, 31)
+    aged(31, place / ENTRY / CHECKSUMS, place / f"{ENTRY}.lock")
     for name in ("touch", "rename", "unlink"):
         monkeypatch.setattr(Path, name, refuse)
     monkeypatch.setattr(os, "utime", refuse)
     code_cache.clean_up(place)
-    assert build() == 1
+    assert built() == 1

@@ -2,7 +2,6 @@
 """Laws of connectors that a user states, and stops, which are such laws."""
 
 import math
-import os
 import re
 import warnings
 from dataclasses import dataclass
@@ -11,33 +10,17 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from compiled_law import compiled_law
-from helpers import (
-    in_turn,
-    law_of,
-    needs_mpirun,
-    on_two_processes,
-    require_restart,
-)
+from compiled_law import require_tangent
+from helpers import in_turn, law_of, raises, require_restart
 from scenes import clamped
 from scipy.integrate import solve_ivp
+from user_classes import Stiffening as Cubic
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
 
 f = ub.extend.law_functions
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
-
-
-@dataclass(frozen=True)
-class Cubic(ub.extend.ConnectorLaw):
-    """Nonlinear spring."""
-
-    k: float
-    cubic: float
-
-    def energy(self, motion, state):
-        return self.k * motion**2 / 2 + self.cubic * motion**4 / 4
 
 
 @dataclass(frozen=True)
@@ -81,25 +64,21 @@ class Maxwell(ub.extend.ConnectorLaw):
 
 
 @dataclass(frozen=True)
-class Drive(ub.extend.ConnectorLaw):
+class Bad(ub.extend.ConnectorLaw):
     """It pushes in the direction of the motion."""
 
     c: float
-    active: ClassVar = True
-    entry: ClassVar = "drives"
 
     def resistance(self, motion, rate, state, dt):
         return -self.c * rate
 
 
 @dataclass(frozen=True)
-class Bad(ub.extend.ConnectorLaw):
-    """The same, without saying so."""
+class Drive(Bad):
+    """The same, and says so."""
 
-    c: float
-
-    def resistance(self, motion, rate, state, dt):
-        return -self.c * rate
+    active: ClassVar = True
+    entry: ClassVar = "drives"
 
 
 LAWS = {
@@ -117,63 +96,44 @@ SCHEMES = [
 ]  # fmt: skip
 
 
-def cantilever(*laws, load=None, **more):
+def cantilever(*laws, load=lambda t: math.sin(9 * t)):
     """A flexible cantilever with a connector of each law across its end."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     connectors = [ub.Slide(ub.ground(1, 0), beam.end, law, axis=(0, 1)) for law in laws]
-    push = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=load or (lambda t: math.sin(9 * t)))
-    held = {"supports": [ub.Clamped(beam.start)], "loads": [push]}
-    return beam.end, connectors, ub.Scene([beam], connectors=connectors, **held, **more)
+    push = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=load)
+    return beam.end, connectors, clamped(beam, loads=[push], connectors=connectors)
 
 
-def carriage(law, v, mass=2.0, more=()):
-    """A body on a rail that arrives with a velocity."""
-    body = ub.Body((1, 0), mass=mass, inertia=1.0)
+def carriage(*laws, v=0.0, force=0.0, amplitude=lambda t: 1.0):
+    """A body of 2 kg on a rail, with a velocity or under a force."""
+    body = ub.Body((1, 0), mass=2.0, inertia=1.0)
     rail = ub.ground(0, 0), body.middle
-    connector = ub.Slide(*rail, law)
+    connectors = [ub.Slide(*rail, law) for law in laws]
+    push = ub.PointLoad(body.middle, force=(force, 0), amplitude=amplitude)
     scene = ub.Scene(
-        bodies=[body], joints=[ub.Prismatic(*rail)],
-        connectors=[connector, *(ub.Slide(*rail, one) for one in more)],
-        initial=[ub.Velocity((body,), linear=(v, 0))],
+        bodies=[body], joints=[ub.Prismatic(*rail)], connectors=connectors,
+        loads=[push] if force else [], initial=[ub.Velocity((body,), linear=(v, 0))] if v else [],
     )  # fmt: skip
-    return body.middle, connector, scene
+    return body.middle, connectors[0], scene
 
 
 run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 
 
-# -- the compiled law ----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
 def test_tangent_is_the_derivative(name, scheme):
-    """Against central differences, in small steps, in large ones and in none."""
-    law = LAWS[name]
-    answers = compiled_law(law, scheme)
-    known = {f"number {n}": x for n, x in law.parameters().items()} | {
-        "dt": 0.01,
-        "theta": scheme.theta,
-    }
-    known |= {f"state {n}": 1e-3 for n in law.variables}
-
-    def ask(e0, e1):
-        return answers({**known, "before 0": e0, "motion 0": e1})
-
-    for e0, e1 in [(0.01, 0.013), (-0.02, 0.03), (0.01, 0.01 + 1e-9), (0.02, 0.02), (0.0, 0.0)]:
-        ε = 1e-6
-        found = (ask(e0, e1 + ε)[0] - ask(e0, e1 - ε)[0]) / (2 * ε)
-        assert ask(e0, e1)[1] == pytest.approx(found, rel=1e-5, abs=0.6 if name == "drag" else 1e-4)
+    """In small steps, in large ones and in none."""
+    steps = (0.01, 0.013), (-0.02, 0.03), (0.01, 0.01 + 1e-9), (0.02, 0.02), (0.0, 0.0)
+    least = 0.6 if name == "drag" else 1e-4
+    require_tangent(LAWS[name], scheme, steps, 1e-6, lambda force, k: np.maximum(1e-5 * k, least))
 
 
-@pytest.mark.parametrize("law", [Cubic(100.0, 1e5), Bump(200.0, 0.02), LAWS["stop"]], ids=repr)
-@pytest.mark.parametrize("dt", [2e-2, 1e-3])
+@pytest.mark.parametrize("name", ["bump", "stop"])
 @pytest.mark.filterwarnings("ignore:the energy ledger is open")  # a claim of 10 rtol = 1e-13
-def test_energy_is_conserved(law, dt):
-    _, connector, scene = carriage(law, v=0.1)
-    solution = run(
-        scene, ub.EnergyMomentum(), t=(0, 1000 * dt), dt=dt, newton=ub.Newton(rtol=1e-13)
-    )
+def test_energy_is_conserved(name):
+    _, connector, scene = carriage(LAWS[name], v=0.1)
+    newton = ub.Newton(rtol=1e-13)
+    solution = run(scene, ub.EnergyMomentum(), t=(0, 10), dt=2e-2, newton=newton)
     total = solution.energy.total
     assert np.ptp(total) < 1e-11 * total[0]
     assert solution.energy["stored"].max() > 0.01 * total[0]
@@ -201,12 +161,10 @@ def test_the_reference_finds_the_same(name, scheme, as_by_reference):
     np.testing.assert_allclose(lost, mine.dissipated, rtol=0, atol=1e-15)
     if isinstance(scheme, ub.extend.EnergyMomentumBase):
         assert found.energy.worst < 1e-12
-    if name in ("drag", "maxwell", "damped stop") and isinstance(
-        scheme, ub.extend.EnergyMomentumBase
-    ):
-        loss = np.diff(mine.dissipated)
-        assert mine.dissipated[-1] > 0
-        assert loss.min() > -1e-16 or (name, scheme.theta) == ("maxwell", 0.6)
+        if name in ("drag", "maxwell", "damped stop"):
+            assert mine.dissipated[-1] > 0
+            loss = np.diff(mine.dissipated).min()
+            assert loss > -1e-16 or (name, scheme.theta) == ("maxwell", 0.6)
     if scheme == ub.EnergyMomentumStatic():
         assert np.diff(found.energy["numerical"]).min() > -1e-16 or name == "bump"
 
@@ -227,30 +185,19 @@ class Named(Maxwell):
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum(0.1, 0.1)], ids=str)
 def test_names_of_variables_are_free(scheme, as_by_reference):
-    _, (connector,), scene = cantilever(Named(200.0, 20.0))
-    solution = run(scene, scheme, newton=ub.Newton(rtol=1e-12))
-    as_by_reference(solution)
-    named = solution.connector(connector)
-    _, (connector,), scene = cantilever(LAWS["maxwell"])
-    for one, other in zip(named, run(scene, scheme).connector(connector), strict=True):
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
+    _, _, scene = cantilever(Named(200.0, 20.0))
+    as_by_reference(run(scene, scheme, newton=ub.Newton(rtol=1e-12)))
 
 
 def test_an_end_of_equilibrium_is_at_rest():
     """With theta = 1 forces are those at the ends of steps: nothing alternates [closed]."""
-    push, soft = ub.ramp(0.3), ub.Spring(1.0)
-    for law, scheme in [
-        (ub.Stop(100.0, high=0.0), ub.EnergyMomentumStatic()),
-        (Cubic(99.0, 0.0), ub.Static()),
+    for law, scheme, stiffness in [
+        (ub.Stop(100.0, high=0.0), ub.EnergyMomentumStatic(), 101.0),
+        (Cubic(99.0, 0.0), ub.Static(), 100.0),
     ]:
-        at, _, scene = carriage(law, v=0.0, more=[soft])
-        load = ub.PointLoad(at, force=(1.0, 0), amplitude=push)
-        scene = ub.Scene(
-            (), joints=scene.joints, loads=[load], bodies=scene.bodies, connectors=scene.connectors
-        )
+        at, _, scene = carriage(law, ub.Spring(1.0), force=1.0, amplitude=ub.ramp(0.3))
         solution = run(scene, scheme, t=(0, 1), dt=0.1)
-        stiffness = 101.0 if isinstance(law, ub.Stop) else 100.0
-        expected = np.array([push(t) for t in solution.times]) / stiffness
+        expected = np.minimum(solution.times / 0.3, 1.0) / stiffness
         np.testing.assert_allclose(solution.displacement(at)[:, 0], expected, atol=1e-12)
 
 
@@ -276,56 +223,17 @@ def test_a_maxwell_element_relaxes(scheme, order):
     np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.1)
 
 
-# -- runs ----------------------------------------------------------------------------------------
-
-
-def all_laws():
-    return cantilever(*LAWS.values(), Drive(0.05))
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.05), ub.Newmark(), ub.Static()], ids=str)
-def test_restart_and_start(scheme, shared_path):
-    _, connectors, scene = all_laws()
-    whole = require_restart(run, scene, connectors, scheme, shared_path, until=0.6)
-    if scheme == ub.EnergyMomentum(0.05):
-        assert whole.energy.worst < 1e-9
-
-
-def test_save_and_load(shared_path):
-    _, (connector, *_), scene = all_laws()
-    solution, path = run(scene, ub.EnergyMomentum()), shared_path / "run.h5"
-    solution.save(path)
-    with pytest.raises(ub.ArgumentError, match="the class Cubic of your own"):
-        ub.Solution.load(path)
-    loaded = ub.Solution.load(path, scene=scene)
-    assert np.array_equal(loaded.connector(connector).force, solution.connector(connector).force)
-    more = [run(scene, ub.EnergyMomentum(), t=(0.6, 0.8), start=one) for one in (solution, loaded)]
-    assert np.array_equal(more[0].q, more[1].q)
-    _, (stop,), scene = cantilever(LAWS["damped stop"])
-    solution = run(scene, ub.EnergyMomentum())
-    solution.save(path)
-    assert ub.Solution.load(path).scene.connectors[0].law == stop.law
-
-
-def test_steps_need_no_python():
-    """All steps of a run are taken in C."""
-    _, _, scene = all_laws()
-    simulation = ub.Simulation(scene, ub.EnergyMomentum())
+def test_restart_and_start(shared_path):
+    """All steps are taken in C."""
+    _, connectors, scene = cantilever(*LAWS.values(), Drive(0.05))
+    scheme = ub.EnergyMomentum(0.1, 0.1)
+    whole = require_restart(run, scene, connectors, scheme, shared_path, until=0.4)
+    assert whole.energy.worst < 1e-9
+    simulation = ub.Simulation(scene, scheme)
     python = {lib.phase_in_python, lib.run_in_python, lib.begin_in_python}
     phases = [loop for one in simulation.equation.phases for loop in (*one.begin, *one.accept)]
     assert not python & {function for function, _ in phases}
     simulation.close()
-
-
-def test_steps_that_are_cut_or_adaptive():
-    """[self] A stiff law whose steps are cut, and adaptive steps, lose as much as small ones."""
-    laws = Maxwell(500.0, 20.0), Cubic(100.0, 1e7), ub.Stop(1e4, high=0.004, damping=3.0)
-    _, _, scene = cantilever(*laws)
-    fine = run(scene, ub.EnergyMomentum(), dt=5e-4)
-    adaptive = run(scene, ub.EnergyMomentum(), dt=ub.Adaptive(1e-5))
-    assert adaptive.energy.worst < 1e-9
-    for entry, lost in fine.energy.lost.items():
-        assert adaptive.energy.lost[entry][-1] == pytest.approx(lost[-1], rel=2e-2)
 
 
 def test_motions_of_all_kinds(as_by_reference):
@@ -340,53 +248,17 @@ def test_motions_of_all_kinds(as_by_reference):
     assert found.energy.worst < 1e-12
 
 
-SHARED = """
-import sys
-sys.path[:0] = [{here!r}, {tests!r}]
-from ufl_beam import parallel
-parallel.SMALLEST_SUBDOMAIN = 1
-import test_connector_laws as t
-at, links, scene = t.all_laws()
-solution = t.run(scene, t.ub.EnergyMomentum())
-t.ub.print_once(repr([float(solution.connector(x).force[-1]) for x in links]))
-t.ub.print_once(repr([float(x[-1]) for x in solution.energy.values()]))
-"""
+@dataclass(frozen=True)
+class Damped(Cubic):
+    c: float
 
-
-@pytest.mark.serial
-@needs_mpirun
-def test_two_processes_share_a_scene():
-    here = os.path.dirname(os.path.abspath(__file__))
-    code = SHARED.format(here=here, tests=os.path.dirname(here))
-    found = on_two_processes("-c", code)
-    assert found.returncode == 0, found.stderr
-    forces, energies = map(eval, found.stdout.splitlines()[-2:])
-    _, connectors, scene = all_laws()
-    solution = run(scene, ub.EnergyMomentum())
-    alone = [solution.connector(x).force[-1] for x in connectors]
-    np.testing.assert_allclose(forces, alone, rtol=0, atol=1e-9 * np.abs(alone).max())
-    ends = [x[-1] for x in solution.energy.values()]
-    np.testing.assert_allclose(energies, ends, rtol=0, atol=1e-9 * np.abs(ends).max())
-
-
-# -- analyses ------------------------------------------------------------------------------------
+    def resistance(self, motion, rate, state, dt):
+        return self.c * rate * (1 + motion)
 
 
 def test_modes_about_a_state():
     """A body on a cubic spring with a damper: K and C from the derivatives [closed]."""
-
-    @dataclass(frozen=True)
-    class Damped(Cubic):
-        c: float
-
-        def resistance(self, motion, rate, state, dt):
-            return self.c * rate * (1 + motion)
-
-    at, connector, scene = carriage(Damped(100.0, 4e4, 3.0), v=0.0)
-    load = ub.PointLoad(at, force=(5.0, 0), amplitude=lambda t: 1.0)
-    scene = ub.Scene(
-        (), joints=scene.joints, loads=[load], bodies=scene.bodies, connectors=[connector]
-    )
+    at, _, scene = carriage(Damped(100.0, 4e4, 3.0), force=5.0)
     state = run(scene, ub.Static(), t=(0, 2e9), dt=1e9)  # nothing creeps any more
     x = state.displacement(at)[-1, 0]
     assert 100 * x + 4e4 * x**3 == pytest.approx(5.0, rel=1e-9)
@@ -398,52 +270,29 @@ def test_modes_about_a_state():
 
 def test_modes_keep_the_variables():
     """A vibration about a state is faster than the creep: K is that of the spring [closed]."""
-    _, _, scene = carriage(Maxwell(50.0, 10.0), v=0.0)
+    _, _, scene = carriage(Maxwell(50.0, 10.0))
     assert ub.modes(scene, 1).omega[0] == pytest.approx(math.sqrt(50.0 / 2.0), rel=1e-9)
-
-
-@pytest.mark.filterwarnings("ignore:buckling. the factors:ufl_beam.ModelWarning")
-def test_buckling_on_a_spring_of_ones_own():
-    """A column on a turning spring with a load: the bend of the law belongs to its derivative."""
-    column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e7, GA=1e7, EI=1e5), cells=4)
-    factors = []
-    for law in (Cubic(5.0, 30.0), ub.ForceLaw(lambda e, rate: 5.0 * e + 30.0 * e**3)):
-        foot = ub.Turn(ub.ground(0, 0), column.start, law)
-        push = ub.PointLoad(column.end, force=(0.3, -1.0), amplitude=lambda t: t)
-        scene = ub.Scene(
-            [column], supports=[ub.Pinned(column.start)], loads=[push], connectors=[foot]
-        )
-        state = run(scene, ub.Static(), t=(0, 1), dt=0.25)
-        factors.append(ub.buckling(scene, 1, at=state, t=2.0).factors[0])
-    assert factors[0] == pytest.approx(factors[1], rel=1e-6)
 
 
 def test_on_a_path_rates_vanish():
     """Rates vanish on a path, and Maxwell elements are relaxed [closed]."""
-    at, _, scene = cantilever(Cubic(100.0, 1e5), Drag(50.0, 9.0), Maxwell(200.0, 9.0),
-                                       load=lambda t: t)  # fmt: skip
+    laws = Cubic(100.0, 1e5), Drag(50.0, 9.0), Maxwell(200.0, 9.0)
+    at, _, scene = cantilever(*laws, load=lambda t: t)
     path = ub.follow(scene, ub.LoadControl(0.2), steps=5)
-    elastic = cantilever(Cubic(100.0, 1e5), ub.Spring(50.0), load=lambda t: t)
-    other = run(elastic[2], ub.Static(), t=(0, 1), dt=0.2)
-    np.testing.assert_allclose(
-        path.displacement(at)[-1], other.displacement(elastic[0])[-1], rtol=1e-7
-    )
+    end, _, elastic = cantilever(Cubic(100.0, 1e5), ub.Spring(50.0), load=lambda t: t)
+    other = run(elastic, ub.Static(), t=(0, 1), dt=0.2)
+    np.testing.assert_allclose(path.displacement(at)[-1], other.displacement(end)[-1], rtol=1e-7)
 
     class Endless(Maxwell):
         def increments(self, motion, rate, state, dt):
             return {"creep": self.k * (motion - state.creep) * dt / (self.eta + self.k * dt)}
 
     scene = cantilever(Endless(200.0, 9.0), load=lambda t: t)[2]
-    with pytest.raises(
-        ub.ArgumentError, match=r"Endless.increments returns creep = .* for dt = inf"
-    ):
+    with raises("Endless.increments returns creep = ", " for dt = inf"):
         ub.follow(scene, ub.LoadControl(0.2), steps=5)
 
 
-# -- stops with damping --------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("damping", "v"), [(0.5, 0.3), (2.0, 0.3), (2.0, 3.0), (100.0, 1.0)])
+@pytest.mark.parametrize(("damping", "v"), [(0.5, 0.3), (2.0, 3.0), (100.0, 1.0)])
 def test_a_damped_stop_takes_a_part_of_the_velocity(damping, v):
     """The velocity after a contact against the ordinary differential equation [independent]."""
     k, m = 2e4, 2.0
@@ -457,28 +306,16 @@ def test_a_damped_stop_takes_a_part_of_the_velocity(damping, v):
     expected = -end.y[1, -1] / v
     if damping * v < 1:
         assert expected == pytest.approx(1 - 2 / 3 * damping * v, abs=0.5 * (damping * v) ** 2)
-    found = []
-    for dt in (2e-4, 1e-4):
-        at, connector, scene = carriage(ub.Stop(k, high=0.01, damping=damping), v=v)
-        solution = run(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=dt)
-        history = solution.connector(connector)
-        assert history.force.min() > -1e-9 * history.force.max()  # it never pulls
-        assert solution.energy.worst < 1e-9
-        lost = solution.energy.lost["contact"]
-        assert np.diff(lost).min() > -1e-12 * lost[-1]
-        np.testing.assert_allclose(lost, history.dissipated, atol=1e-15)
-        found.append(-solution.velocity(at)[-1, 0] / v)
-        assert lost[-1] == pytest.approx(m * v**2 / 2 * (1 - found[-1] ** 2), rel=1e-7)
-    assert found[1] == pytest.approx(expected, abs=2e-3)
-
-
-def test_a_stop_without_damping_has_no_entry():
-    _, (connector,), scene = cantilever(LAWS["stop"])
-    assert "contact" not in run(scene, ub.EnergyMomentum()).energy
-    assert repr(connector.law) == "Stop(stiffness=300.0, low=-0.004, high=0.006, damping=0.0)"
-
-
-# -- what is refused -----------------------------------------------------------------------------
+    at, connector, scene = carriage(ub.Stop(k, high=0.01, damping=damping), v=v)
+    solution = run(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=1e-4)
+    history, lost = solution.connector(connector), solution.energy.lost["contact"]
+    assert history.force.min() > -1e-9 * history.force.max()  # it never pulls
+    assert solution.energy.worst < 1e-9
+    assert np.diff(lost).min() > -1e-12 * lost[-1]
+    np.testing.assert_allclose(lost, history.dissipated, atol=1e-15)
+    found = -solution.velocity(at)[-1, 0] / v
+    assert lost[-1] == pytest.approx(m * v**2 / 2 * (1 - found**2), rel=1e-7)
+    assert found == pytest.approx(expected, abs=2e-3)
 
 
 def quadratic(self, motion, state):
@@ -489,41 +326,38 @@ ONE = {"variables": {"z": 0.0}, "energy": quadratic}
 
 
 @pytest.mark.parametrize(
-    ("make", "message"),
+    ("members", "message"),
     [
-        (lambda: law_of(), "Mine has neither energy nor resistance, nor a limit; define one"),
+        ({}, "Mine has neither energy nor resistance, nor a limit; define one"),
+        ({"energy": quadratic, "fields": {"k": math.nan}}, "Mine: k = nan is not finite"),
+        ({"energy": quadratic, "fields": {"k": "x"}}, "Mine: k = 'x' is not a number"),
+        ({"energy": quadratic, "fields": {"parameters": 1.0}}, "have the name parameters"),
+        ({"energy": quadratic, "entry": "kinetic"}, "is no entry for a loss; use"),
+        ({"energy": quadratic, "entry": 3}, "Mine.entry = 3 must be text"),
+        (ONE, "has variables and no increments"),
+        ({**ONE, "increments": lambda s, e, r, z, dt: {}}, "lacks z"),
         (
-            lambda: type("Plain", (ub.extend.ConnectorLaw,), {"energy": quadratic})(),
-            "must be a dataclass",
-        ),
-        (lambda: law_of(energy=quadratic, fields={"k": math.nan}), "Mine: k = nan is not finite"),
-        (lambda: law_of(energy=quadratic, fields={"k": "x"}), "Mine: k = 'x' is not a number"),
-        (lambda: law_of(energy=quadratic, fields={"parameters": 1.0}), "have the name parameters"),
-        (lambda: law_of(energy=quadratic, entry="kinetic"), "is no entry for a loss; use"),
-        (lambda: law_of(energy=quadratic, entry=3), "Mine.entry = 3 must be text"),
-        (lambda: law_of(**ONE), "has variables and no increments"),
-        (lambda: law_of(**ONE, increments=lambda s, e, r, z, dt: {}), "lacks z"),
-        (
-            lambda: law_of(**ONE, increments=lambda s, e, r, z, dt: {"z": e, "y": e}),
+            {**ONE, "increments": lambda s, e, r, z, dt: {"z": e, "y": e}},
             "has y, which `variables` does not name",
         ),
-        (lambda: law_of(**ONE, increments=lambda s, e, r, z, dt: 0.0), "must return a dict"),
+        ({**ONE, "increments": lambda s, e, r, z, dt: 0.0}, "must return a dict"),
         (
-            lambda: law_of(**ONE, increments=lambda s, e, r, z, dt: {"z": "a"}),
+            {**ONE, "increments": lambda s, e, r, z, dt: {"z": "a"}},
             "increments returns z = 'a' at no motion",
         ),
-        (lambda: law_of(energy=lambda s, e, z: None), "Mine.energy returns None at no motion"),
-        (lambda: law_of(energy=lambda s, e, z: 1 / e), "Mine.energy returns"),
-        (lambda: law_of(resistance=lambda s, e, r, z, dt: z.y), "Mine.resistance fails at no"),
-        (lambda: law_of(energy=quadratic, variables={"z": math.inf}), "no increments"),
+        ({"energy": lambda s, e, z: None}, "Mine.energy returns None at no motion"),
+        ({"resistance": lambda s, e, r, z, dt: z.y}, "Mine.resistance fails at no"),
     ],
-)  # fmt: skip
-def test_incomplete_laws_are_refused(make, message):
+)
+def test_incomplete_laws_are_refused(members, message):
     """When the connector is made, with its name and that of the class."""
     beam = ub.Beam((0, 0), (1, 0), SECTION)
-    with pytest.raises(ub.ArgumentError, match=re.escape(message)) as error:
-        ub.Turn(ub.ground(1, 0), beam.end, make())
+    with raises(message) as error:
+        ub.Turn(ub.ground(1, 0), beam.end, law_of(**members))
     assert "Turn(ground (1, 0), beam.end (1, 0))" in str(error.value)
+    plain = type("Plain", (ub.extend.ConnectorLaw,), {"energy": quadratic})
+    with raises("must be a dataclass"):
+        ub.Turn(ub.ground(1, 0), beam.end, plain())
 
 
 @dataclass(frozen=True)
@@ -539,32 +373,25 @@ class Untraceable(ub.extend.ConnectorLaw):
 def test_laws_that_cannot_be_compiled_are_refused():
     """Before the first step, with file and line of the method."""
     _, _, scene = cantilever(Untraceable(1.0))
-    with pytest.raises(
-        ub.ArgumentError, match=r"Untraceable: it cannot be called with .*"
-    ) as error:
+    with raises("Untraceable: it cannot be called with ") as error:
         run(scene, ub.EnergyMomentum())
     assert re.search(r"\(.*test_connector_laws\.py, line \d+\)\. Laws", str(error.value))
 
 
+class Preload(Cubic):
+    def energy(self, motion, state):
+        return super().energy(motion - 0.01, state)
+
+
 def test_preloaded_laws_need_a_state():
     """A force at no motion is no equilibrium; in statics the first step comes to it [closed]."""
-
-    class Preload(Cubic):
-        def energy(self, motion, state):
-            return super().energy(motion - 0.01, state)
-
-    at, _, scene = carriage(Preload(100.0, 0.0), v=0.0)
-    with pytest.raises(
-        ub.ArgumentError, match=r"modes: Preload of Slide.* bears a force at no motion"
-    ):
+    at, _, scene = carriage(Preload(100.0, 0.0))
+    with raises("modes: Preload of Slide", " bears a force at no motion"):
         ub.modes(scene, 1)
     assert run(scene, ub.Static()).displacement(at)[-1, 0] == pytest.approx(0.01)
     swings = run(scene, ub.EnergyMomentum(), t=(0, 5))
     assert swings.energy.total[0] == pytest.approx(100 * 0.01**2 / 2, rel=1e-9)
     assert swings.energy.worst < 1e-9
-
-
-# -- watches -------------------------------------------------------------------------------------
 
 
 @pytest.mark.serial  # the first process warns

@@ -19,9 +19,6 @@ LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
 """Moments of the hinge and of yielding of the damaged arm, N m; fracture energy, J."""
 
 
-# -- models ------------------------------------------------------------------------------------
-
-
 def static(scene, dt=1.0, **more):
     """Static run from t = 0 to 1."""
     return ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, **more)
@@ -60,12 +57,17 @@ def crank():
     return ub.Scene(bodies=[wheel, block], joints=[bearing, rail, rod], connectors=[spring, motor])
 
 
-def storeys(bays, floors):
-    """A frame with a name for each member, a force and line loads for each floor."""
+def storeys(bays, floors, law_of=lambda name: None):
+    """A frame with a name for each member, a force and line loads for each floor.
+
+    ``law_of`` returns the law of the hinges at both ends of a member.
+    """
     beams, joints, loads = [], {}, []
 
     def add(a, b, name):
-        beam = ub.Beam(a, b, STEEL, cells=2, name=name)
+        law = law_of(name)
+        hinges = {0: law, 1: law} if law else {}
+        beam = ub.Beam(a, b, STEEL, cells=2, name=name, hinges=hinges)
         beams.append(beam)
         for place in (beam.start, beam.end):
             joints.setdefault(place.point, []).append(place)
@@ -105,9 +107,6 @@ LAWS = [
     ub.RigidPlastic(ub.Softening(0.5, 1.0)),
 ]
 """A connector law of each kind."""
-
-
-# -- contents of figures -----------------------------------------------------------------------
 
 
 def outlines(figure, group, kind=object, *, fill=None, width=None):

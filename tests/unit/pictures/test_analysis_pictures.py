@@ -5,28 +5,28 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn import boxes_of, circles, outlines, require_apart, texts
+from drawn import STEEL, boxes_of, circles, outlines, require_apart, texts
 from matplotlib.figure import Figure
+from scenes import clamped
 
 import ufl_beam as ub
 import ufl_beam.structures as st
 from ufl_beam.plotting.style import BLUE, RED
 
 
+def column(**more):
+    return ub.Beam((0, 0), (0, 2), STEEL, cells=4, name="column", **more)
+
+
 def test_a_capacity_curve_shows_hinges_and_targets():
-    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
-    law = ub.ElastoPlastic(5e4, isotropic=1e5)  # N m, N m/rad
-    column = ub.Beam((0, 0), (0, 2), section, cells=2, hinges={0.0: law}, name="column")
-    scene = ub.Scene(
-        [column], supports=[ub.Clamped(column.start)], masses=[ub.PointMass(column.end, 5e3)]
-    )
-    curve = st.pushover(scene, column.end, -0.05, steps=10, progress=False)
+    beam = column(hinges={0.0: ub.ElastoPlastic(5e4, isotropic=1e5)})  # N m, N m/rad
+    scene = clamped(beam, masses=[ub.PointMass(beam.end, 5e3)])
+    curve = st.pushover(scene, beam.end, -0.05, steps=10, progress=False)
     targets = curve.n2(lambda T: 8.0, 0.5), curve.asce41(lambda T: 8.0)
     figure = ub.plot(curve, targets=targets)
     axes = figure.axes[0]
-    np.testing.assert_allclose(
-        axes.lines[0].get_xydata(), np.column_stack([curve.displacement, curve.base_shear / 1e3])
-    )
+    expected = np.column_stack([curve.displacement, curve.base_shear / 1e3])
+    np.testing.assert_allclose(axes.lines[0].get_xydata(), expected)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "1: column.start (0, 0) yields" in labels
     assert {label.split(":")[0] for label in labels} == {"N2", "ASCE 41", "1"}
@@ -40,33 +40,23 @@ def test_a_capacity_curve_shows_hinges_and_targets():
     ]
     for ax in (None, Figure(figsize=(6, 4), layout="constrained").subplots()):
         figure = ub.plot(replace(curve, hinges=tuple(several)), ax=ax)
-        axes = figure.axes[0]
-        assert len(circles(axes)) == 15
+        assert len(circles(figure.axes[0])) == 15
         assert len(texts(figure)) > 10
         require_apart(boxes_of(figure), figure.bbox)
 
 
-def test_a_response_to_a_spectrum_has_both_signs():
-    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
-    column = ub.Beam((0, 0), (0, 2), section, cells=4, name="column")
-    scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
-    response = st.response_spectrum_analysis(scene, lambda T: 3.0, n=6)
-    axes = ub.plot(response, "V").axes[0]
-    assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
-    assert axes.get_title(loc="left").endswith("by response spectrum")
-
-
-def test_an_envelope_of_combinations_has_both_extremes():
-    section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
-    column = ub.Beam((0, 0), (0, 2), section, cells=2, name="column")
-    scene = ub.Scene([column], supports=[ub.Clamped(column.start)])
-    cases = {"W": [ub.PointLoad(column.end, force=(1e3, -1e3))]}
-    found = st.load_combinations(
-        scene, cases, {"left": {"W": 1.5}, "right": {"W": -1.5}}, progress=False
-    )
-    axes = ub.plot(found, "V").axes[0]
-    assert len(outlines(axes.figure, RED)) == len(outlines(axes.figure, BLUE)) == 1
-    assert axes.get_title(loc="left").endswith("of 2 load combinations")
+def test_responses_and_combinations_have_both_signs():
+    beam = column()
+    scene = clamped(beam)
+    cases = {"W": [ub.PointLoad(beam.end, force=(1e3, -1e3))]}
+    factors = {"left": {"W": 1.5}, "right": {"W": -1.5}}
+    for found, words in (
+        (st.response_spectrum_analysis(scene, lambda T: 3.0, n=6), "by response spectrum"),
+        (st.load_combinations(scene, cases, factors, progress=False), "of 2 load combinations"),
+    ):
+        figure = ub.plot(found, "V")
+        assert len(outlines(figure, RED)) == len(outlines(figure, BLUE)) == 1
+        assert figure.axes[0].get_title(loc="left").endswith(words)
 
 
 def test_demand_curves_end_at_collapse():
@@ -81,12 +71,9 @@ def test_demand_curves_end_at_collapse():
     np.testing.assert_array_equal(left.lines[1].get_xydata(), [[0, 0], [0.1, 1], [0.4, 2]])
     np.testing.assert_array_equal(left.lines[4].get_xydata()[:3], [[0, 0], [0.1, 1], [0.3, 2]])
     np.testing.assert_allclose(right.lines[1].get_xydata(), [[0, 1], [1 / 3, 2], [2 / 3, 3]])
-    fit = curves.fragility()
     curve = right.lines[0].get_xydata()
-    np.testing.assert_allclose(curve[:, 0], fit(curve[:, 1]))
-    certain = st.DemandCurves(
-        curves.motions, curves.intensities, 0.4, demand, curves.end, 0 * outcome, study
-    )
+    np.testing.assert_allclose(curve[:, 0], curves.fragility()(curve[:, 1]))
+    certain = replace(curves, outcome=0 * outcome)
     assert len(ub.plot(certain).axes) == 1  # nothing collapses
     labels = "drift (1)", "spectral acceleration (m/s²)"
     for figure, words in (

@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Axes that the user gives, and settings and styles of Matplotlib that stay."""
 
-from itertools import pairwise
-
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn import STEEL, boxes_of, require_apart, static
+from drawn import boxes_of, require_apart
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
@@ -14,46 +12,32 @@ from matplotlib.figure import Figure
 import ufl_beam as ub
 from ufl_beam.plotting.style import BLUE, INK
 
-THIN = ub.Section.rectangle(b=1e-3, h=2e-3, E=210e9, nu=0.3)
+PLACED = {"history": 1.0, "moment-curvature": 1.0, "hinge": 0.0}
+"""Pictures of a place, and its parameter along the beam."""
 
-ONE_PANEL = {
-    "scene": lambda s, e, **ax: ub.plot(s.scene, **ax),
-    "shape": lambda s, e, **ax: ub.plot(s, **ax),
-    "moments": lambda s, e, **ax: ub.plot(s, "M", **ax),
-    "shapes": lambda s, e, **ax: ub.plot(s, "shapes", **ax),
-    "history": lambda s, e, **ax: ub.plot(s, "history", s.scene.beams[0].end, **ax),
-    "curvature": lambda s, e, **ax: ub.plot(s, "moment-curvature", s.scene.beams[0].end, **ax),
-    "hinge": lambda s, e, **ax: ub.plot(s, "hinge", s.scene.beams[0].start, **ax),
-    "damage": lambda s, e, **ax: ub.plot(s, "damage", **ax),
-    "dissipation": lambda s, e, **ax: ub.plot(s, "dissipation", **ax),
-    "extremes": lambda s, e, **ax: ub.plot(e, **ax),
-}
+ONE_PANEL = ["scene", "extremes", "shape", "M", "shapes", "damage", "dissipation", *PLACED]
 
 
-@pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
-def test_a_picture_is_in_the_axes_of_the_user_only(damaged, extremes, draw):
-    """Neither the size nor other axes of the figure change."""
+def draw(name, run, extremes, ax):
+    if name in ("scene", "extremes"):
+        return ub.plot(run.scene if name == "scene" else extremes, ax=ax)
+    places = [run.scene.beams[0].at(PLACED[name])] if name in PLACED else []
+    return ub.plot(run, name, *places, ax=ax)
+
+
+@pytest.mark.parametrize("name", ONE_PANEL)
+def test_a_picture_is_in_the_axes_of_the_user_only(damaged, extremes, name):
+    """Neither the size nor other parts of the figure change; a figure is refused as axes."""
     figure = Figure(figsize=(10, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    assert draw(damaged, extremes, ax=right) is figure
+    left, right = (part.subplots() for part in figure.subfigures(1, 2))
+    assert draw(name, damaged, extremes, right) is figure
     figure.draw_without_rendering()
     assert right.has_data() or right.collections
     assert not left.has_data()
-    assert not figure.legends
+    assert not [*figure.legends, *left.figure.legends, *right.figure.legends]
     np.testing.assert_array_equal(figure.get_size_inches(), (10, 4))
-
-
-def test_axes_may_be_in_a_part_of_a_figure(damaged):
-    whole = Figure(figsize=(14, 5), layout="constrained")
-    axes = whole.subfigures(1, 2)[1].subplots()
-    assert ub.plot(damaged, "damage", ax=axes) is whole
-    whole.draw_without_rendering()
-
-
-@pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
-def test_a_figure_instead_of_axes_is_refused(damaged, extremes, draw):
     with pytest.raises(ub.ArgumentError, match=r"ax = .* must be axes of Matplotlib"):
-        draw(damaged, extremes, ax=Figure())
+        draw(name, damaged, extremes, figure)
 
 
 def test_labels_and_legend_are_within_the_axes_of_the_user(damaged):
@@ -65,27 +49,10 @@ def test_labels_and_legend_are_within_the_axes_of_the_user(damaged):
     require_apart([*boxes, legend.get_window_extent()], axes.get_window_extent())
 
 
-@pytest.mark.parametrize("end", [(0, 30), (30, 0), (0, 0.3)])
-def test_labels_of_ticks_of_a_slender_object_are_apart(end):
-    """Along the short side, too."""
-    beam = ub.Beam((0, 0), end, STEEL if max(end) > 1 else THIN, cells=2)
-    run = static(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
-    for figure in (ub.plot(run.scene), ub.plot(run), ub.plot(run, "shapes", count=2)):
-        figure.draw_without_rendering()
-        for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis):
-            low, high = axis.get_view_interval()
-            shown = [x for x in axis.get_major_ticks() if low <= x.get_loc() <= high]
-            boxes = [tick.label1.get_window_extent() for tick in shown]
-            assert boxes
-            assert not any(box.overlaps(after) for box, after in pairwise(boxes))
-
-
-def beam_of(figure):
-    """Line of the deformed beam."""
-    return max(figure.axes[0].lines, key=lambda line: line.get_zorder() == 4)
-
-
 def test_colours_suit_a_dark_background(damaged):
+    def beam_of(figure):
+        return max(figure.axes[0].lines, key=lambda line: line.get_zorder() == 4)
+
     with plt.style.context("dark_background"):
         dark, model = ub.plot(damaged), ub.plot(damaged.scene)
     for figure in (dark, model):
@@ -100,27 +67,13 @@ def test_colours_suit_a_dark_background(damaged):
     assert all(same_color(edge[0], "white") for edge in edges)
 
 
-def test_sizes_of_fonts_follow_that_of_texts(damaged):
-    """Sizes of titles, ticks and labels keep their proportions."""
-
-    def sizes(figure):
-        axes = figure.axes[0]
-        return np.array([
-            axes.title.get_fontsize(), axes.xaxis.label.get_fontsize(),
-            axes.get_xticklabels()[0].get_fontsize(), axes.texts[0].get_fontsize(),
-        ])  # fmt: skip
-
-    for shown in ((damaged, "M"), (damaged.scene,)):
-        ours = sizes(ub.plot(*shown))
-        with mpl.rc_context({"font.size": 26.0}):
-            np.testing.assert_allclose(sizes(ub.plot(*shown)), 2.0 * ours)
-
-
 def test_settings_of_matplotlib_are_used_and_not_changed(damaged):
     run, end = damaged, damaged.scene.beams[0].end
     settings = {"axes.edgecolor": "red", "figure.dpi": 80, "axes.prop_cycle": mpl.cycler(color="k")}
-    with mpl.rc_context(settings):
+    with mpl.rc_context({**settings, "font.size": 26.0}):
         figure = ub.plot(run, "history", end)
+        large = ub.plot(run, "M").axes[0].texts[0].get_fontsize()
+    assert large == pytest.approx(2 * ub.plot(run, "M").axes[0].texts[0].get_fontsize())
     assert same_color(figure.axes[0].spines["left"].get_edgecolor(), "red")
     assert figure.dpi == 80
     assert same_color(figure.axes[0].lines[-1].get_color(), "k")

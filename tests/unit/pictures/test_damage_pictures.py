@@ -22,16 +22,6 @@ def legend(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def test_the_run_yields_breaks_and_turns_back(damaged, arm):
-    state = damaged.material_at(arm.start)
-    assert state.plastic[-1] > 0
-    assert 0.1 * FRACTURE < state.hinge[-1] < 0.95 * FRACTURE
-    assert np.diff(state.jump).min() < 0 < np.diff(state.jump).max()
-
-
-# -- paths -------------------------------------------------------------------------------------
-
-
 def test_the_path_of_moment_and_curvature_is_that_of_the_law(damaged, arm):
     place = arm.at(0.3)
     figure = ub.plot(damaged, "moment-curvature", place)
@@ -51,50 +41,26 @@ def test_the_path_of_moment_and_curvature_is_that_of_the_law(damaged, arm):
         np.testing.assert_array_equal(mark.get_xydata()[0], end)
 
 
-def test_units_suit_the_values_and_data_stay_in_si():
-    beam = ub.Beam(
-        (0, 0), (1, 0), ub.Section(1e9, 1e9, 1e6, bending=ub.ElastoPlastic(5e3)), cells=1
-    )
-    turn = ub.PointLoad(beam.end, moment=4e3, amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[turn])
-    solution = static(scene, dt=1 / 30)
-    axes = ub.plot(solution, "moment-curvature", beam.end).axes[0]
-    assert axes.get_ylabel() == "bending moment M (kN m)"
-    assert axes.yaxis.get_major_formatter()(-2500.0) == "−2.5"
-    # One cell in pure bending has the moment of the load, but for the tolerance of equilibrium
-    assert path_in(axes)[0][-1, 1] == pytest.approx(4e3, rel=1e-9)
-
-
 def test_the_path_of_a_hinge_has_its_jump_and_moment(damaged, arm):
+    """It turns to and fro; the filled area is the dissipated energy."""
     state = damaged.material_at(arm.start)
-    figure = ub.plot(damaged, "hinge", arm.start)
-    axes = figure.axes[0]
+    assert state.plastic[-1] > 0
+    assert 0.1 * FRACTURE < state.hinge[-1] < 0.95 * FRACTURE
+    assert np.diff(state.jump).min() < 0 < np.diff(state.jump).max()
+    axes = ub.plot(damaged, "hinge", arm.start).axes[0]
     path, _ = path_in(axes)
     np.testing.assert_array_equal(path, np.column_stack([state.jump, state.forces[:, 2]]))
     assert axes.get_xlabel() == "jump of rotation (mrad)"
     assert axes.get_ylabel() == "bending moment M (N m)"
-    title = axes.get_title(loc="left")
+    title, spent = axes.get_title(loc="left"), with_unit(state.hinge[-1], "J")
     assert f"hinge at {arm.start}" in title
-    spent = with_unit(state.hinge[-1], "J")
     assert f"{spent} dissipated, {100 * state.hinge[-1] / FRACTURE:.3g} % of 3 J" in title
-
-
-def test_the_filled_area_is_the_dissipated_energy(damaged, arm):
-    fills = [
-        c
-        for c in ub.plot(damaged, "hinge", arm.start).axes[0].collections
-        if len(c.get_paths()) < 9
-    ]
-    outlines = [path.vertices for fill in fills for path in fill.get_paths()]
-    x, M = zip(*(outline.T for outline in outlines), strict=True)
-    areas = [abs(np.sum(a[:-1] * b[1:] - a[1:] * b[:-1])) / 2 for a, b in zip(x, M, strict=True)]
-    lost = damaged.material_at(arm.start).hinge[-1]
+    fills = [c for c in axes.collections if len(c.get_paths()) < 9]
+    points = [path.vertices.T for fill in fills for path in fill.get_paths()]
+    areas = [abs(np.sum(x[:-1] * M[1:] - x[1:] * M[:-1])) / 2 for x, M in points]
     # The steps in which the hinge begins to open start below its limit: by the moment of one step,
     # a tenth of the limit, over a jump that is a fiftieth of the whole.
-    assert sum(areas) == pytest.approx(lost, rel=0.02)
-
-
-# -- the frame ---------------------------------------------------------------------------------
+    assert sum(areas) == pytest.approx(state.hinge[-1], rel=0.02)
 
 
 def test_damage_colours_the_cells_that_yielded(damaged, arm):
@@ -105,9 +71,8 @@ def test_damage_colours_the_cells_that_yielded(damaged, arm):
     assert 0 < len(yielded) < 4
     rest = damaged.numbering.points[damaged.numbering.vertices_of(arm)]
     points = rest + 2 * (damaged.shape(arm, 50) - rest)
-    np.testing.assert_allclose(
-        outlines(figure, "yielded"), np.stack([points[yielded], points[yielded + 1]], axis=1)
-    )
+    expected = np.stack([points[yielded], points[yielded + 1]], axis=1)
+    np.testing.assert_allclose(outlines(figure, "yielded"), expected)
     largest = dissipated.max() / 0.25  # cells of 0.25 m
     unit, prefix = decimal_prefix(largest)
     assert bar.get_ylabel() == f"dissipated by plastic strains ({prefix}J/m)"
@@ -126,14 +91,9 @@ def test_damage_marks_hinges_by_the_broken_part(damaged, arm):
         assert legend(figure) == ["hinge, 10 % broken", "50 %", "fully open"]
         sizes.append(mark.get_markersize())
     assert sizes[0] < sizes[1]
-
-
-def test_there_are_no_marks_before_damage(damaged):
-    figure = ub.plot(damaged, "damage", n=0)
-    assert len(figure.axes) == 1  # no colour bar
-    assert not outlines(figure, "yielded")
-    assert not circles(figure.axes[0])
-    assert not figure.legends
+    before = ub.plot(damaged, "damage", n=0)
+    assert len(before.axes) == 1  # no colour bar
+    assert not [*outlines(before, "yielded"), *circles(before.axes[0]), *before.legends]
 
 
 @pytest.mark.parametrize("law", [ub.Softening(0.0, 1.0), ub.LinearSoftening(1.0, 1e-2)])
@@ -153,17 +113,16 @@ def test_a_fully_open_hinge_is_hollow(law):
 @pytest.mark.parametrize("what", ["shape", "M"])
 def test_diagrams_mark_hinges_and_yielded_cells(damaged, arm, what):
     figure = ub.plot(damaged, what, n=50)
-    axes = figure.axes[0]
+    axes, points = figure.axes[0], damaged.shape(arm, 50)
     (mark,) = circles(axes)
-    np.testing.assert_allclose(mark.get_xydata()[0], damaged.shape(arm, 50)[0])
-    ends = damaged.shape(arm, 50)
+    np.testing.assert_allclose(mark.get_xydata()[0], points[0])
     (zone,) = np.flatnonzero(damaged.material(arm, 50).plastic)
     bands = [line.get_xydata() for line in axes.lines if line.get_linewidth() > 5]
-    np.testing.assert_allclose(bands, [ends[zone : zone + 2]])
+    np.testing.assert_allclose(bands, [points[zone : zone + 2]])
     assert legend(figure)[-2:] == ["yielded or cracked", "hinge, open"]
-    nothing_yet = ub.plot(damaged, what, n=1)
-    assert not circles(nothing_yet.axes[0])
-    assert not any(line.get_linewidth() > 5 for line in nothing_yet.axes[0].lines)
+    axes = ub.plot(damaged, what, n=1).axes[0]
+    assert not circles(axes)
+    assert not any(line.get_linewidth() > 5 for line in axes.lines)
 
 
 def test_cracks_of_fibres_are_damage():
@@ -178,13 +137,13 @@ def test_cracks_of_fibres_are_damage():
     assert not circles(axes)
 
 
-# -- the ledger --------------------------------------------------------------------------------
+def lines_of(figure):
+    return {line.get_label(): line.get_ydata() for line in figure.axes[0].lines}
 
 
 def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
     figure = ub.plot(damaged, "dissipation")
-    (axes,) = figure.axes
-    energy = damaged.energy
+    (axes,), energy = figure.axes, damaged.energy
     lower = np.zeros_like(damaged.times)
     assert len(axes.collections) == len(energy.lost) == 3
     for area, (name, lost) in zip(axes.collections, energy.lost.items(), strict=True):
@@ -196,15 +155,15 @@ def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
             apart = np.abs(outline[None] - points[:, None]).sum(axis=2).min(axis=1)
             assert apart.max() <= 1e-14 * energy.energy_transferred
         lower = lower + lost
-    drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
-    assert set(drawn) == {"supplied", "in the scene"}
+    drawn = lines_of(figure)
     np.testing.assert_array_equal(drawn["supplied"], sum(energy.supplied.values()))
     np.testing.assert_array_equal(drawn["in the scene"], energy.total)
     assert axes.get_ylabel() == "energy (J)"
     title = axes.get_title(loc="left")
     assert title.endswith(f"of {with_unit(energy.energy_transferred, 'J')} transferred")
     assert f"{energy.worst:.1e}".split("e")[0] in title
-    assert set(legend(figure)) == {*drawn, *(f"lost: {name}" for name in energy.lost)}
+    losses = {f"lost: {name}" for name in energy.lost}
+    assert {*legend(figure)} == {"supplied", "in the scene", *losses} == {*drawn, *losses}
 
 
 def test_dissipation_adds_the_energy_at_the_start():
@@ -212,58 +171,32 @@ def test_dissipation_adds_the_energy_at_the_start():
     beam = ub.Beam((0, 0), (1, 0), section, cells=1)
     thrown = ub.Scene([beam], initial=[ub.Velocity((beam,), (1.0, 0.0))])
     solution = ub.simulate(thrown, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)
-    lines = {x.get_label(): x.get_ydata() for x in ub.plot(solution, "dissipation").axes[0].lines}
+    lines = lines_of(ub.plot(solution, "dissipation"))
     # 1 kg at 1 m/s, and no work
     np.testing.assert_allclose(lines["at the start, and supplied"], 0.5, rtol=1e-12)
 
 
-# -- files -------------------------------------------------------------------------------------
-
-
 def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
-    beam = yielding_beam()
-    scene = moved(beam, v=lambda t: 0.1 * t)
-    file = ub.XDMF(shared_path / "run.xdmf")
-    solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1, record=file)
-
-    found = on_first_rank(lambda: read_xdmf(shared_path / "run.xdmf"))
-    written, state = found.in_cells[-1], solution.material(beam)
-    forces = solution.section_forces(beam)
-    hinge = solution.material_at(beam.start)
+    beam, path = yielding_beam(), shared_path / "run.xdmf"
+    scene, scheme = moved(beam, v=lambda t: 0.1 * t), ub.EnergyMomentumStatic()
+    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.1, record=ub.XDMF(path))
+    written = on_first_rank(lambda: read_xdmf(path)).in_cells[-1]
+    state, hinge = solution.material(beam), solution.material_at(beam.start)
     jump, spent = (np.where(np.arange(4) == 0, x[-1], 0.0) for x in (hinge.jump, hinge.hinge))
     # Copies, so equal to the last bit
-    np.testing.assert_array_equal(written["M"], forces[:, 2])
+    np.testing.assert_array_equal(written["M"], solution.section_forces(beam)[:, 2])
     np.testing.assert_array_equal(written["jump"], jump)
     np.testing.assert_array_equal(written["dissipated energy"], state.plastic + spent)
     assert jump[0] != 0
 
 
-# -- what is refused ---------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda s: ub.plot(s, "moment-curvature", s.scene.beams[0].end),
-        lambda s: ub.plot(s, "hinge", s.scene.beams[0].end),
-        lambda s: ub.plot(s, "damage"),
-        lambda s: ub.plot(s, "dissipation"),
-    ],
-)
-def test_elastic_scenes_are_refused(portal, draw):
+@pytest.mark.parametrize("what", ["moment-curvature", "hinge", "damage", "dissipation"])
+def test_elastic_scenes_are_refused(portal, what):
+    places = [portal.scene.beams[0].end] if what in ("moment-curvature", "hinge") else []
     with pytest.raises(ub.ArgumentError, match="no beam of the scene yields or breaks"):
-        draw(portal)
+        ub.plot(portal, what, *places)
 
 
 def test_a_cell_without_a_hinge_is_refused(damaged, arm):
     with pytest.raises(ub.ArgumentError, match=r"plot: neither arm.at\(0.9\).*has a hinge"):
         ub.plot(damaged, "hinge", arm.at(0.9))
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [({"n": 200}, "n = 200: the solution kept 151 times"), ({"magnify": 0}, "magnify = 0")],
-)
-def test_wrong_arguments_of_damage_are_refused(damaged, options, message):
-    with pytest.raises(ub.ArgumentError, match=message):
-        ub.plot(damaged, "damage", **options)

@@ -8,9 +8,12 @@ import sys
 import numpy as np
 import pytest
 from drawn import FIRST, static
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.plotting import films
+
+on_first = pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
 
 
 @pytest.fixture
@@ -23,37 +26,27 @@ def no_screen(monkeypatch):
     assert "DISPLAY" not in os.environ
 
 
-def require_a_frame(path):
-    """The first rank writes a picture; between the time and the bar of colours is the frame."""
+@pytest.mark.usefixtures("no_screen")
+@pytest.mark.parametrize(("degree", "color"), [(None, "M"), (1, "rotation"), (3, "M")])
+def test_a_frame_is_rendered(swing, tmp_path, degree, color):
+    """With hinges and inner nodes the vertices of a beam are not one after the other."""
     from matplotlib.image import imread
 
+    if degree is None:
+        solution = swing
+    else:
+        section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
+        beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.5: ub.Softening(50.0, 20.0)})
+        force = ub.PointLoad(beam.end, force=(0, -40), amplitude=ub.ramp(1.0))
+        solution = static(clamped(beam, loads=[force]), mesh=ub.Mesh(degree=degree))
+    path = tmp_path / "frame.png"
+    ub.render(solution, path, quantity=color, thickness=20, size=(320, 200))
     assert path.exists() == FIRST
     if FIRST:
         picture = imread(path)
         assert picture.shape[:2] == (200, 320)
+        # Between the time and the bar of colours is the frame
         assert np.count_nonzero(picture[30:160, :, :3].min(axis=-1) < 0.8) > 300
-
-
-@pytest.mark.usefixtures("no_screen")
-@pytest.mark.parametrize("color", ["M", "rotation"])
-def test_a_frame_is_rendered(swing, tmp_path, color):
-    path = tmp_path / "swing.png"
-    ub.render(swing, path, quantity=color, thickness=20, size=(320, 200))
-    require_a_frame(path)
-
-
-@pytest.mark.usefixtures("no_screen")
-@pytest.mark.parametrize("degree", [1, 3])
-@pytest.mark.parametrize("color", ["M", "rotation"])
-def test_hinges_and_inner_nodes_are_rendered(tmp_path, color, degree):
-    """The vertices of a beam are not one after the other then."""
-    section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
-    beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.5: ub.Softening(50.0, 20.0)})
-    force = ub.PointLoad(beam.end, force=(0, -40), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[force])
-    path = tmp_path / "hinged.png"
-    ub.render(static(scene, mesh=ub.Mesh(degree=degree)), path, quantity=color, size=(320, 200))
-    require_a_frame(path)
 
 
 def frames_of(film):
@@ -89,34 +82,28 @@ def test_a_front_camera_follows_a_place(tmp_path):
 
 
 @pytest.mark.usefixtures("no_screen")
-def test_a_camera_sees_the_whole_motion_and_stands_still(swing, tmp_path):
-    path = tmp_path / "swing.gif"
-    ub.animate(swing, path, fps=10, seconds=0.5, quantity="N", magnify=3, size=(240, 160))
+@pytest.mark.parametrize(
+    ("name", "height", "options"),
+    [("swing", 130, {"quantity": "N", "magnify": 3}), ("engine", 160, {})],
+)
+def test_a_camera_sees_the_whole_motion_and_stands_still(request, tmp_path, name, height, options):
+    """Of beams, and of bodies without beams."""
+    path = tmp_path / "film.gif"
+    run = request.getfixturevalue(name)
+    ub.animate(run, path, fps=10, seconds=0.4, size=(320, 160), **options)
     assert path.exists() == FIRST
     if FIRST:
         frames, durations = frames_of(path)
-        assert durations == [100] * 5
-        assert frames.shape[:3] == (5, 160, 240)
-        middle = frames[:, 25:130].astype(float).mean(axis=-1)
-        assert np.abs(middle[-1] - middle[0]).max() > 50  # it moves
-        edge = np.concatenate([middle[:, :, :2], middle[:, :, -2:]], axis=2)
+        assert durations == [100] * 4
+        assert frames.shape[:3] == (4, 160, 320)
+        seen = frames[:, 25:height].astype(float).mean(axis=-1)
+        assert np.count_nonzero(seen[0] < 200) > 100
+        assert np.abs(seen[-1] - seen[0]).max() > 50  # it moves
+        edge = np.concatenate([seen[:, :, :2], seen[:, :, -2:]], axis=2)
         assert edge.min() > 240  # and stays within the picture
         bar = frames[:, 150:].astype(float)
-        assert np.abs(bar - bar[0]).max() < 40  # one scale of colours; GIF has 256 of them
-
-
-@pytest.mark.usefixtures("no_screen")
-def test_bodies_without_beams_move_in_a_film(engine, tmp_path):
-    path = tmp_path / "engine.gif"
-    ub.animate(engine, path, fps=10, seconds=0.4, size=(320, 160))
-    assert path.exists() == FIRST
-    if FIRST:
-        frames = frames_of(path)[0].astype(float).mean(axis=-1)[:, 25:]
-        assert len(frames) == 4
-        assert np.count_nonzero(frames[0] < 200) > 500  # bodies, and all that is on them
-        assert np.count_nonzero(np.abs(frames[-1] - frames[0]) > 50) > 100  # they move
-        edge = np.concatenate([frames[:, :, :2], frames[:, :, -2:]], axis=2)
-        assert edge.min() > 240  # and stay within the picture
+        # One scale of colours; GIF has 256 of them
+        assert name == "engine" or np.abs(bar - bar[0]).max() < 40
 
 
 def images(count):
@@ -131,9 +118,8 @@ def test_ffmpeg_writes_mp4(tmp_path):
     film = ub.Film(tmp_path / "a.mp4")
     with open(film, "rb") as file:
         assert file.read(12)[4:8] == b"ftyp"
-    assert '<video controls loop style="max-width: 100%" src="data:video/mp4;base64,AAAA' in (
-        film._repr_html_()
-    )
+    start = '<video controls loop style="max-width: 100%" src="data:video/mp4;base64,AAAA'
+    assert start in film._repr_html_()
 
 
 @pytest.fixture
@@ -164,24 +150,24 @@ def test_an_interrupted_film_leaves_no_file(tmp_path, ffmpeg):
     assert not (tmp_path / "a.mp4").exists()
 
 
-@pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
+@on_first
+@pytest.mark.usefixtures("no_screen")
 @pytest.mark.parametrize(
-    ("missing", "path", "message"),
+    ("missing", "name", "message"),
     [
         ("pyvista", "a.gif", r"pip install ufl_beam\[view\]"),
         ("imageio_ffmpeg", "a.mp4", "pip install imageio-ffmpeg, or: apt-get install ffmpeg"),
     ],
 )
-@pytest.mark.usefixtures("no_screen")
-def test_a_missing_package_is_named(portal, tmp_path, monkeypatch, missing, path, message):
+def test_a_missing_package_is_named(portal, tmp_path, monkeypatch, missing, name, message):
     monkeypatch.setitem(sys.modules, missing, None)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(ImportError, match=message):
-        ub.animate(portal, tmp_path / path)
-    assert not (tmp_path / path).exists()
+        ub.animate(portal, tmp_path / name)
+    assert not (tmp_path / name).exists()
 
 
-@pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
+@on_first
 def test_a_missing_screen_is_an_error(portal, tmp_path, monkeypatch):
     pyvista = pytest.importorskip("pyvista")
     monkeypatch.setattr(pyvista, "vtk_version_info", (9, 3, 0))

@@ -5,8 +5,9 @@ import re
 
 import numpy as np
 import pytest
-from drawn import STEEL, circles, middles, storeys, texts
+from drawn import STEEL, circles, middles, static, storeys, texts
 from matplotlib.colors import same_color, to_hex
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.plotting.style import GREY, SKY, scale
@@ -14,44 +15,34 @@ from ufl_beam.plotting.style import GREY, SKY, scale
 COLUMN, GIRDER = ub.ElastoPlastic(40e3, kinematic=4e5), ub.ElastoPlastic(30e3, kinematic=3e5)
 
 
-def frame(bays, floors, law_of):
-    """The frame of `storeys` with hinges, pushed to the right by growing forces, without weight."""
-    plain = storeys(bays, floors)
-    beams = {}
-    for k, beam in enumerate(plain.beams):
-        law = law_of(k, beam)
-        beams[beam] = ub.Beam(
-            beam.start.point, beam.end.point, STEEL, cells=2, name=beam.name,
-            hinges={0: law, 1: law},
-        )  # fmt: skip
-
-    def moved(place):
-        return beams[place.beam].at(place.s)
-
-    joints = [ub.Rigid(*map(moved, joint.places)) for joint in plain.joints]
-    feet = [ub.Clamped(moved(support.place)) for support in plain.supports]
-    loads = [
-        ub.PointLoad(moved(x.place), force=(1e3, 0), amplitude=lambda t: t)
-        for x in plain.loads
-        if isinstance(x, ub.PointLoad)
-    ]
-    return ub.Scene([*beams.values()], joints=joints, supports=feet, loads=loads)
+def frame(law_of):
+    """The frame with hinges, pushed to the right by growing forces, without weight."""
+    plain = storeys(3, 5, law_of)
+    pushed = [load.place for load in plain.loads if isinstance(load, ub.PointLoad)]
+    loads = [ub.PointLoad(place, force=(1e3, 0), amplitude=lambda t: t) for place in pushed]
+    return ub.Scene(plain.beams, joints=plain.joints, supports=plain.supports, loads=loads)
 
 
-def by_kind(k, beam):
-    return COLUMN if beam.name.startswith("C") else GIRDER
+def by_kind(name):
+    return COLUMN if name.startswith("C") else GIRDER
 
 
 @pytest.fixture(scope="module")
-def pushed():
-    """Path of the frame up to a sway of 0.5 m, with the extremes of section forces."""
-    scene, extremes = frame(3, 5, by_kind), ub.Extremes()
-    top = max((beam.end for beam in scene.beams), key=lambda place: place.point[1] - place.point[0])
-    control = ub.DisplacementControl(top, "u", 0.025)
-    return ub.follow(scene, control, steps=20, record=extremes, progress=False), extremes
+def extremes():
+    """Extremes of section forces of the path."""
+    return ub.Extremes()
 
 
-# -- the model ---------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def path(extremes):
+    """Path of the frame up to a sway of 0.5 m."""
+    scene = frame(by_kind)
+    control = ub.DisplacementControl(scene["C40"].end, "u", 0.025)
+    return ub.follow(scene, control, steps=20, record=extremes, progress=False)
+
+
+def words_of(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def notes(figure):
@@ -60,23 +51,9 @@ def notes(figure):
     return {x.get_text(): x.get_color() for x in sorted(found, key=lambda x: -x.get_position()[1])}
 
 
-def test_many_equal_connectors_have_one_note():
-    """A connector with another law, or with a name, keeps its label."""
-    beam = ub.Beam((0, 0), (6, 0), STEEL, cells=6)
-    law = ub.Spring(2e6)
-    springs = [ub.Slide(ub.ground(x, 0), beam.at(x / 6), law, axis=(0, 1)) for x in range(1, 6)]
-    other = ub.Slide(ub.ground(6, 0), beam.end, ub.Spring(3e6), axis=(0, 1))
-    supports = [ub.Pinned(beam.start)]
-    figure = ub.plot(ub.Scene([beam], supports=supports, connectors=[*springs, other]))
-    assert [*notes(figure)] == ["5 connectors: 2 MN/m"]
-    assert [x for x in texts(figure) if "MN/m" in x] == ["5 connectors: 2 MN/m", "3 MN/m"]
-    few = ub.plot(ub.Scene([beam], supports=supports, connectors=springs[:4]))
-    assert [*notes(few)] == []
-
-
 def test_many_equal_hinges_have_one_note():
     """4 x 5 columns and 3 x 5 girders; the colour of the note is that of its hinges."""
-    figure = ub.plot(frame(3, 5, by_kind))
+    figure = ub.plot(frame(by_kind))
     found = notes(figure)
     forces = "5 forces: 1 kN × f(t)"
     assert [*found] == ["dots: 40 hinges, 40 kN m", "dots: 30 hinges, 30 kN m", forces]
@@ -89,25 +66,12 @@ def test_many_equal_hinges_have_one_note():
 
 def test_many_different_limits_are_three_notes_and_a_range():
     """Each storey has its limit, 10 to 50 kN m, at 14 ends of columns and girders."""
-    figure = ub.plot(
-        frame(3, 5, lambda k, beam: ub.ElastoPlastic(1e4 * (1 + int(beam.name[1])), kinematic=1e5))
-    )
+    figure = ub.plot(frame(lambda name: ub.ElastoPlastic(1e4 * (1 + int(name[1])), kinematic=1e5)))
     words = [f"dots: 14 hinges, {limit} kN m" for limit in (10, 20, 30)]
     found = notes(figure)
     assert [*found][:4] == [*words, "dots: 28 hinges, 40 kN m to 50 kN m"]
     colors = [*found.values()][:4]
     assert [len(middles(figure, "hinges", fill=x)) for x in colors] == [14, 14, 14, 28]
-
-
-def test_few_equal_hinges_keep_their_labels():
-    law = ub.ElastoPlastic(2e4, kinematic=1e5)
-    beam = ub.Beam((0, 0), (8, 0), STEEL, cells=8, hinges=dict.fromkeys((0, 0.25, 0.5, 0.75), law))
-    figure = ub.plot(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
-    assert texts(figure).count("hinge 20 kN m") == 4
-    assert not notes(figure)
-
-
-# -- damage ------------------------------------------------------------------------------------
 
 
 def rotations(path, n=-1):
@@ -117,8 +81,8 @@ def rotations(path, n=-1):
     return sorted(x for x in found if x > 0)
 
 
-def test_hardening_hinges_are_coloured_by_their_rotation(pushed):
-    path, _ = pushed
+def test_hardening_hinges_are_coloured_by_their_rotation(path):
+    """No two marks cover each other, also at joints of four members."""
     axes, bar = ub.plot(path, "damage").axes
     marks = circles(axes)
     expected = rotations(path)
@@ -130,56 +94,40 @@ def test_hardening_hinges_are_coloured_by_their_rotation(pushed):
     drawn = sorted(to_hex(mark.get_markerfacecolor()) for mark in marks)
     assert drawn == sorted(map(to_hex, rule.to_rgba(expected)))
     assert len({*drawn}) > 10
-
-
-def test_each_hinge_at_a_joint_has_its_place(pushed):
-    """No two marks cover each other, also at joints of four members."""
-    path, _ = pushed
-    at = np.array([mark.get_xydata()[0] for mark in circles(ub.plot(path, "damage").axes[0])])
+    at = np.array([mark.get_xydata()[0] for mark in marks])
     apart = np.linalg.norm(at[:, None] - at, axis=2) + np.eye(len(at))
     assert apart.min() > 0.1  # m, of a frame of 15 m
 
 
-def test_hinges_are_coloured_by_acceptance_limits(pushed):
-    path, _ = pushed
+def test_hinges_are_coloured_by_acceptance_limits(path):
     limits = {"IO": 0.005, "LS": 0.015, "CP": 0.03}  # rad
     for n in (8, -1):
         figure = ub.plot(path, "damage", n=n, limits=limits)
-        words = [text.get_text() for text in figure.legends[0].get_texts()]
         ranges = ["IO, up to 0.005 rad", "LS, up to 0.015 rad", "CP, up to 0.03 rad"]
-        assert words == [*ranges, "beyond CP"]
+        assert words_of(figure) == [*ranges, "beyond CP"]
         colors = [mark.get_markerfacecolor() for mark in figure.legends[0].legend_handles]
         marks = [mark.get_markerfacecolor() for mark in circles(figure.axes[0])]
         counts = [sum(same_color(mark, color) for mark in marks) for color in colors]
         expected, _ = np.histogram(rotations(path, n), [0, *limits.values(), np.inf])
         assert counts == list(expected)
     assert min(counts) > 0  # at the end there is one of each
+    with pytest.raises(ub.ArgumentError, match=r"limits\['LS'\] = 0.01 rad is not above the limit"):
+        ub.plot(path, "damage", limits={"IO": 0.02, "LS": 0.01})
 
 
 def test_damage_of_a_mechanism_without_beams():
     """A wheel whose yielding spring is turned by 0.1 rad; beyond 2 N m / 40 N m it yields."""
     wheel = ub.Body((0, 0), mass=1.0, inertia=1.0)
-    law = ub.Spring(40.0, law=ub.ElastoPlastic(2.0, kinematic=10.0))
-    joint = ub.Revolute(ub.ground(0, 0), wheel.middle)
-    turn = ub.Turn(ub.ground(0, 0), wheel.middle, law)
-    motion = ub.PrescribedMotion(lambda t: 0.1 * t)
-    drive = ub.Turn(ub.ground(0, 0), wheel.middle, motion)
-    scene = ub.Scene(bodies=[wheel], joints=[joint], connectors=[turn, drive])
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    ends = ub.ground(0, 0), wheel.middle
+    turn = ub.Turn(*ends, ub.Spring(40.0, law=ub.ElastoPlastic(2.0, kinematic=10.0)))
+    drive = ub.Turn(*ends, ub.PrescribedMotion(lambda t: 0.1 * t))
+    scene = ub.Scene(bodies=[wheel], joints=[ub.Revolute(*ends)], connectors=[turn, drive])
+    run = static(scene, dt=0.1)
     axes, bar = ub.plot(run, "damage").axes
     assert len(circles(axes)) == 1
     plastic = 0.1 - run.connector(turn).force[-1] / 40.0
     assert plastic > 0.01
     assert bar.get_ylim()[1] == pytest.approx(1e3 * plastic)  # mrad
-
-
-def test_wrong_limits_are_refused(pushed):
-    path, _ = pushed
-    with pytest.raises(ub.ArgumentError, match=r"limits\['LS'\] = 0.01 rad is not above the limit"):
-        ub.plot(path, "damage", limits={"IO": 0.02, "LS": 0.01})
-
-
-# -- envelopes ---------------------------------------------------------------------------------
 
 
 def arrows(figure):
@@ -188,15 +136,14 @@ def arrows(figure):
     return sum(isinstance(marker, tuple) and marker[:2] == (3, 0) for marker in marks)
 
 
-def test_an_envelope_has_the_arrows_of_its_legend_and_more_than_two_labels(pushed):
+def test_an_envelope_has_the_arrows_of_its_legend_and_more_than_two_labels(path, extremes):
     """35 beams have 70 diagrams; each label is a value of the envelope, with three digits."""
-    _, extremes = pushed
     figure = ub.plot(extremes, "M")
     assert arrows(figure) == 35
-    words = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert words[:2] == ["M > 0: tension right of the arrow", "M < 0: tension left of the arrow"]
+    sides = ["M > 0: tension right of the arrow", "M < 0: tension left of the arrow"]
+    assert words_of(figure)[:2] == sides
     labels = [float(text.replace("−", "-")) for text in texts(figure)]
-    found = [extremes.section_forces(beam) for beam in extremes.solution.scene.beams]
+    found = [extremes.section_forces(beam) for beam in path.scene.beams]
     values = np.concatenate([x for one in found for x in (one.high[:, 2], one.low[:, 2])]) / 1e3
     assert len(labels) > 15
     for label in labels:
@@ -209,16 +156,13 @@ def test_an_envelope_has_the_arrows_of_its_legend_and_more_than_two_labels(pushe
 def test_the_legend_names_no_arrow_without_arrows():
     """72 beams are more than have arrows."""
     scene, extremes = storeys(4, 8), ub.Extremes()
-    ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, record=extremes, progress=False)
+    static(scene, record=extremes)
     for shown, what in ((extremes, "M"), (extremes, "V"), (extremes.solution, "M")):
         figure = ub.plot(shown, what)
         assert arrows(figure) == 0
-        words = [text.get_text() for text in figure.legends[0].get_texts()]
+        words = words_of(figure)
         assert words
         assert all(re.fullmatch(rf"{what} [<>] 0: .*, from start to end", x) for x in words)
-
-
-# -- modes -------------------------------------------------------------------------------------
 
 
 def test_modes_show_both_phases_of_bodies():
@@ -226,10 +170,8 @@ def test_modes_show_both_phases_of_bodies():
     mast = ub.Beam((0, 0), (0, 4), STEEL, cells=4, name="mast")
     head = ub.Body((0, 4.5), mass=50.0, inertia=8.0, name="head")
     stay = ub.Stretch(head.at(0.7, 4.5), ub.ground(3, 4.5), ub.Spring(1e4))
-    scene = ub.Scene(
-        [mast], bodies=[head], joints=[ub.Rigid(mast.end, head.at(0, 4))], connectors=[stay],
-        supports=[ub.Clamped(mast.start)],
-    )  # fmt: skip
+    joint = ub.Rigid(mast.end, head.at(0, 4))
+    scene = clamped(mast, bodies=[head], joints=[joint], connectors=[stay])
     shapes = ub.modes(scene, 1)
     axes = ub.plot(shapes, amplitude=0.1).axes[0]
     backward = [line.get_xydata() for line in axes.lines if same_color(line.get_color(), SKY)]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scenes
 from drawn import FIRST, boxes_of, middles, outlines, require_apart, static, storeys, texts
+from helpers import raises, run
 from matplotlib.path import Path
 
 import ufl_beam as ub
@@ -56,31 +57,28 @@ def test_the_shape_has_all_beams_where_they_are(swing):
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
     assert axes.get_title(loc="left") == "shape at t = 0.1 s"
     assert not areas_of(figure)
+    assert not [*areas_of(ub.plot(swing, "M", n=0)), *texts(figure)]  # there is no force yet
 
 
-def in_a_row(count, length):
-    """Picture of beams in one line, rigidly joined."""
-    ends = np.linspace(0.0, length, count + 1)
+def in_a_row(count):
+    """Picture of beams in a line of 1 m, rigidly joined."""
+    ends = np.linspace(0.0, 1.0, count + 1)
     beams = [ub.Beam((a, 0), (b, 0), scenes.SLENDER) for a, b in pairwise(ends)]
-    joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
     supports = [ub.Clamped(beams[0].start), *(ub.Roller(beam.end) for beam in beams)]
-    return ub.plot(static(ub.Scene(beams=beams, joints=joints, supports=supports)))
+    return ub.plot(static(scenes.rigid_chain(beams, supports=supports)))
 
 
-def test_the_number_of_artists_does_not_grow_with_the_scene():
-    """20 000 beams would take minutes as as many artists."""
-    few, many = in_a_row(3, 3.0).axes[0], in_a_row(30, 30.0).axes[0]
-    assert len(few.get_children()) == len(many.get_children())
-
-
-def test_pins_shrink_where_beams_are_short():
-    # Beams of 0.33 and 0.017 m in a picture of one size: the symbols become 0.3 times as large
-    long, short = (np.ptp(outlines(in_a_row(n, 1.0), "pins")[0], axis=0) for n in (3, 60))
+def test_many_beams_have_few_artists_and_small_pins():
+    """Beams of 0.33 and 0.017 m; 20 000 beams would take minutes as as many artists."""
+    few, many = in_a_row(3), in_a_row(60)
+    assert len(few.axes[0].get_children()) == len(many.axes[0].get_children())
+    long, short = (np.ptp(outlines(figure, "pins")[0], axis=0) for figure in (few, many))
     np.testing.assert_allclose(short, 0.3 * long)
 
 
 @pytest.mark.parametrize("what", UNIT)
 def test_extreme_values_are_those_of_the_solution(portal, diagrams, what):
+    """And an area for each run of one sign."""
     values = np.concatenate(values_of(portal, what))
     factor, prefix = decimal_prefix(np.abs(values).max())
     extremes = (values.min(),) if what == "N" else (values.max(), values.min())
@@ -91,54 +89,27 @@ def test_extreme_values_are_those_of_the_solution(portal, diagrams, what):
     assert set(texts(figure)) <= {number(x / factor) for x in values}
     title = figure.axes[0].get_title(loc="left")
     assert f" {what} ({prefix}{UNIT[what]}) at t = 1 s" in title.replace("\N{NO-BREAK SPACE}", " ")
-
-
-@pytest.mark.parametrize("what", UNIT)
-def test_an_area_for_each_run_of_one_sign(portal, diagrams, what):
     runs = sum(1 + np.count_nonzero(np.diff(f > 0)) for f in values_of(portal, what))
-    assert len(areas_of(diagrams[what])) == runs
+    assert len(areas_of(figure)) == runs
 
 
-def test_ordinates_are_in_proportion_to_the_values(portal, diagrams):
-    # A patch of one beam: axis start, the values, axis back.  The roof is nearly horizontal, its
-    # displacement at this load some millimetres: 1 % of the ordinates.
-    roof = portal.scene.beams[1]
-    s, values, *_ = portal.diagram(roof)
-    (outline,) = [x for x in areas_of(diagrams["N"]) if np.ptp(x[:, 0]) > 5.5]
-    tips, shape = outline[1 : 1 + len(values)], portal.shape(roof)
-    heights = tips[:, 1] - np.interp(s, portal.numbering.parameters(roof), shape[:, 1])
-    np.testing.assert_allclose(heights / heights[0], values / values[0], rtol=0.01)
-
-
-def test_moments_stand_on_the_side_in_tension():
-    for a, b in (((0, 0), (1, 0)), ((1, 0), (0, 0))):
-        beam = ub.Beam(a, b, scenes.SLENDER, cells=2)
-        left, right = (beam.start, beam.end) if a == (0, 0) else (beam.end, beam.start)
-        force = 1e-3 * scenes.SLENDER.EI
-        load = ub.PointLoad(right, force=(0, -force))
-        scene = ub.Scene([beam], supports=[ub.Clamped(left)], loads=[load])
-        (area,) = areas_of(ub.plot(static(scene), "M"))
-        assert area[:, 1].max() > 0.05  # the upper fibre of a cantilever pulled down
-
-
-def simple_beam(cells, length=6.0, load=10e3, direction=0.0):
-    """A beam on two supports under a line load across it; turned by an angle."""
-    along = np.array([math.cos(direction), math.sin(direction)])
+def simple_beam(cells, direction):
+    """A beam of 6 m on two supports under a line load of 10 kN/m across it; turned by an angle."""
+    x, y = math.cos(direction), math.sin(direction)
     section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
-    beam = ub.Beam((0, 0), tuple(length * along), section, cells=cells)
-    across = load * np.array([along[1], -along[0]])
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Pinned(beam.start), ub.Roller(beam.end, along=tuple(along))],
-        loads=[ub.LineLoad(beam, force=tuple(across), amplitude=lambda t: t)],
-    )
-    return static(scene)
+    beam = ub.Beam((0, 0), (6 * x, 6 * y), section, cells=cells)
+    supports = [ub.Pinned(beam.start), ub.Roller(beam.end, along=(x, y))]
+    load = ub.LineLoad(beam, force=(10e3 * y, -10e3 * x))
+    return static(ub.Scene([beam], supports=supports, loads=[load]))
 
 
 @pytest.mark.parametrize("direction", [0.0, 2.0])
 def test_moments_under_a_line_load_are_a_parabola(direction):
-    """[closed] w l²/8 = 45 kN m, a parabola without steps; the deflection is 2e-5 of l."""
-    solution = simple_beam(4, direction=direction)
+    """[closed] w l²/8 = 45 kN m, a parabola without steps, on the side in tension.
+
+    The deflection is 2e-5 of l.
+    """
+    solution = simple_beam(4, direction)
     figure = ub.plot(solution, "M")
     assert texts(figure) == ["45"]
     (area,) = areas_of(figure)
@@ -154,9 +125,7 @@ def test_moments_under_a_line_load_are_a_parabola(direction):
 @pytest.mark.parametrize("what", UNIT)
 @pytest.mark.parametrize("direction", [None, 0.0, math.pi / 2], ids=["portal", "beam", "upright"])
 def test_extreme_values_cover_neither_areas_nor_beams_nor_each_other(diagrams, direction, what):
-    figure = (
-        diagrams[what] if direction is None else ub.plot(simple_beam(8, direction=direction), what)
-    )
+    figure = diagrams[what] if direction is None else ub.plot(simple_beam(8, direction), what)
     axes, boxes = figure.axes[0], boxes_of(figure)
     require_apart(boxes, figure.bbox)
     for k, box in enumerate(boxes):
@@ -194,47 +163,15 @@ def test_the_legend_names_the_signs_in_the_picture(portal, diagrams):
     assert not ub.plot(portal).legends
 
 
-@pytest.mark.parametrize(("width", "height"), [(1.0, 1.0), (1.0, 3.0), (4.0, 1.0), (1.0, 1.6)])
-def test_the_axes_fill_the_figure(width, height):
-    """But for words and numbers: an inch or so in each direction."""
-    section = ub.Section(EA=1e9, GA=1e9, EI=1e7)
-    post = ub.Beam((0, 0), (0, height), section, cells=4)
-    roof = ub.Beam((0, height), (width, height), section, cells=4)
-    scene = ub.Scene(
-        [post, roof],
-        joints=[ub.Rigid(post.end, roof.start)],
-        supports=[ub.Clamped(post.start)],
-        loads=[ub.PointLoad(roof.end, force=(0, -1e3), amplitude=lambda t: t)],
-    )
-    figure = ub.plot(static(scene), "M")
-    figure.draw_without_rendering()
-    inches = figure.get_size_inches()
-    blank = inches * (1 - figure.axes[0].get_position().size)
-    assert inches.max() <= 9.0
-    assert (blank < 1.5).all()
-
-
-def test_extremes_of_a_beam_of_one_cell_are_one_area():
-    scene = scenes.cantilever(cells=1, force=(0.0, 1.0))
-    extremes = ub.Extremes()
-    static(scene, record=extremes)
-    assert len(areas_of(ub.plot(extremes, "V"))) == 1
-
-
 def test_envelopes_are_two_diagrams():
     """Each area has ordinates of one of both, across the axis: none leads from one to the other."""
     section = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0, rhoI=0.01)
-    beam = ub.Beam((0, 0), (6, 0), section, cells=8)
+    beam, extremes = ub.Beam((0, 0), (6, 0), section, cells=8), ub.Extremes()
     shake = ub.LineLoad(beam, force=(0.0, 1.0), amplitude=lambda t: math.sin(7 * t))
-    supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
-    scene = ub.Scene([beam], supports=supports, loads=[shake])
-    extremes = ub.Extremes()
-    run = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes, progress=False
-    )
-    found = extremes.section_forces(beam)
+    scene = scenes.clamped(beam, ub.Clamped(beam.end), loads=[shake])
+    solution = run(scene, dt=0.05, record=extremes)
+    found, x = extremes.section_forces(beam), 6 * solution.diagram(beam, points=2).s
     drawn = [outline[:-1] for outline in areas_of(ub.plot(extremes, "V"))]
-    x = 6 * run.diagram(beam, points=2).s
     scale = None
     assert drawn
     for outline in drawn:
@@ -247,21 +184,8 @@ def test_envelopes_are_two_diagrams():
             assert np.isclose(scale * values, ordinate, rtol=1e-9).any()
         # From the lowest to the largest x along the tips, and back along the axis
         assert (np.diff(tips[:, 0]) >= 0).all()
-
-
-def test_there_is_no_diagram_without_a_force(swing):
-    figure = ub.plot(swing, "M", n=0)
-    assert not areas_of(figure)
-    assert not texts(figure)
-
-
-def test_displacements_are_magnified(portal):
-    axes = ub.plot(portal, magnify=10).axes[0]
-    roof = portal.scene.beams[1]
-    drawn = chains(axes)[2][1]
-    undeformed = portal.numbering.points[portal.numbering.vertices_of(roof)]
-    np.testing.assert_allclose(drawn - undeformed, 10 * (portal.shape(roof) - undeformed))
-    assert "× 10" in axes.get_title(loc="left")
+    static(scenes.cantilever(cells=1, force=(0.0, 1.0)), record=extremes)
+    assert len(areas_of(ub.plot(extremes, "V"))) == 1
 
 
 def test_a_saved_picture_has_the_size_of_its_figure(diagrams, tmp_path):
@@ -271,29 +195,31 @@ def test_a_saved_picture_has_the_size_of_its_figure(diagrams, tmp_path):
     figure.savefig(tmp_path / "portal.png")
     assert (tmp_path / "portal.png").exists() == FIRST
     if FIRST:
-        width, height = figure.get_size_inches() * figure.dpi
+        size = (figure.get_size_inches() * figure.dpi)[::-1]
         picture = imread(tmp_path / "portal.png")
-        assert abs(picture.shape[0] - height) <= 1
-        assert abs(picture.shape[1] - width) <= 1
+        np.testing.assert_allclose(picture.shape[:2], size, rtol=0, atol=1)
         assert picture[..., :3].std() > 0.01
 
 
 def test_shapes_have_a_bar_of_times(swing):
-    figure = ub.plot(swing, "shapes", count=5)
+    """Given times are those of the nearest kept states."""
+    figure, scene = ub.plot(swing, "shapes", count=5), swing.scene
     axes, bar = figure.axes
-    scene = swing.scene
-    shapes = [chain for chain in chains(axes) if len(chain) == len(scene.beams)]
-    assert len(shapes) == 6
+    assert sum(len(chain) == len(scene.beams) for chain in chains(axes)) == 6
     assert len(outlines(figure, "masses")) == 5 * len(scene.masses)
     assert bar.get_ylabel() == "time t (s)"
     np.testing.assert_allclose(bar.get_ylim(), (0, 0.1))
+    axes = ub.plot(swing, "shapes", [0.0519, 0.0]).axes[0]
+    # Undeformed, then t = 0, then t = 0.05, which is step 10
+    _, _, last = [chain for chain in chains(axes) if len(chain) == len(scene.beams)]
+    np.testing.assert_array_equal(last[0], swing.shape(scene.beams[0], 10))
 
 
 def test_shapes_of_a_path_on_a_plateau_have_different_colours():
     """Beyond its limit the hinge turns at a constant load factor; the bar has load factors."""
     beam = ub.Beam((0, 0), (2, 0), scenes.SECTION, cells=2, hinges={0.0: ub.ElastoPlastic(10.0)})
     load = ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = scenes.clamped(beam, loads=[load])
     path = ub.follow(scene, ub.DisplacementControl(beam.end, "v", -0.025), steps=20, progress=False)
     assert path.times[-1] == pytest.approx(path.times[10], rel=0.05)
     figure = ub.plot(path, "shapes", count=5)
@@ -307,42 +233,22 @@ def test_shapes_of_a_path_on_a_plateau_have_different_colours():
     assert float(last) == pytest.approx(path.times[-1], rel=5e-3)
 
 
-def test_shapes_are_at_the_nearest_kept_times(swing):
-    axes = ub.plot(swing, "shapes", [0.0519, 0.0]).axes[0]
-    # Undeformed, then t = 0, then t = 0.05, which is step 10
-    _, _, last = [chain for chain in chains(axes) if len(chain) == len(swing.scene.beams)]
-    np.testing.assert_array_equal(last[0], swing.shape(swing.scene.beams[0], 10))
-
-
-@pytest.mark.parametrize(
-    ("component", "column", "label"),
-    [
-        ("u", 0, "displacement u (m)"),
-        ("psi", 2, "rotation ψ (rad)"),
-        ("dv/dt", 1, "velocity dv/dt (m/s)"),
-    ],
-)
-def test_a_history_has_a_line_for_each_place(swing, component, column, label):
-    beam = swing.scene.beams[0]
-    places = [beam.start, beam.at(0.3)]
-    figure = ub.plot(swing, "history", places, component=component)
-    axes = figure.axes[0]
-    motion = swing.velocity if "/" in component else swing.displacement
-    for line, place in zip(axes.lines[1:], places, strict=True):
-        np.testing.assert_array_equal(line.get_xdata(), swing.times)
-        np.testing.assert_array_equal(line.get_ydata(), motion(place)[:, column])
-        assert line.get_label() == str(place)
-    assert axes.get_ylabel() == label
-    assert axes.get_xlabel() == "time t (s)"
-
-
-def test_a_history_may_be_of_one_place_of_a_beam_or_a_body(portal, engine):
-    for run, place in (
-        (portal, portal.scene.beams[0].end),
-        (engine, engine.scene.bodies[0].middle),
+def test_a_history_has_a_line_for_each_place(swing, engine):
+    (beam, *_), (wheel, _) = swing.scene.beams, engine.scene.bodies
+    for solution, component, column, label, places in (
+        (swing, "u", 0, "displacement u (m)", [beam.start, beam.at(0.3)]),
+        (swing, "dv/dt", 1, "velocity dv/dt (m/s)", [beam.start]),
+        (engine, "psi", 2, "rotation ψ (rad)", [wheel.middle]),
     ):
-        (_, line) = ub.plot(run, "history", place).axes[0].lines
-        np.testing.assert_array_equal(line.get_ydata(), run.displacement(place)[:, 1])
+        axes = ub.plot(solution, "history", places, component=component).axes[0]
+        motion = solution.velocity if "/" in component else solution.displacement
+        for line, place in zip(axes.lines[1:], places, strict=True):
+            np.testing.assert_array_equal(line.get_xdata(), solution.times)
+            np.testing.assert_array_equal(line.get_ydata(), motion(place)[:, column])
+            assert line.get_label() == str(place)
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("time t (s)", label)
+    (_, line) = ub.plot(engine, "history", wheel.middle).axes[0].lines
+    np.testing.assert_array_equal(line.get_ydata(), engine.displacement(wheel.middle)[:, 1])
 
 
 def test_the_ledger_is_drawn_with_its_error(swing):
@@ -380,34 +286,35 @@ def test_spectra_share_axes():
     assert ub.plot(elastic, "ductility").axes[0].get_ylabel() == "ductility"
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.0, "0 N m"),
-        (-12345.0, "−12.3 kN m"),
-        (999.9, "1 kN m"),
-        (0.0158, "15.8 mN m"),
-        (2.5e6, "2.5 MN m"),
-    ],
-)
-def test_values_have_a_decimal_prefix(value, text):
-    assert with_unit(value, "N m") == text
+def test_values_have_a_decimal_prefix():
+    values = {0.0: "0 N m", -12345.0: "−12.3 kN m", 999.9: "1 kN m", 0.0158: "15.8 mN m"}
+    assert [with_unit(value, "N m") for value in values] == [*values.values()]
 
 
 ELSEWHERE = ub.Camera(follow=ub.Body((0, 0), mass=1.0, inertia=1.0).middle)
 
 
+def end(s):
+    return s.scene.beams[0].end
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda s: ub.plot(s, "Q"), "quantity = 'Q' of a Solution is not one of shape, "),
+        (lambda s: ub.plot(s, "Q"), "plot: quantity = 'Q' of a Solution is not one of shape, "),
         (lambda s: ub.plot(s, n=3), "n = 3: the solution kept 3 times; give -3 to 2"),
+        (lambda s: ub.plot(s, "M", n="end"), "plot: n = 'end'"),
         (lambda s: ub.plot(s, magnify=0), "magnify = 0 must be positive"),
         (lambda s: ub.plot(s, "shapes", count=0), "count = 0 must be at least 1"),
         (lambda s: ub.plot(s, "shapes", 8), "for a number of shapes give count=8"),
-        (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="w"), "component = 'w'"),
-        (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="du/dt"), "static"),
-        (lambda s: ub.render(s, "a.jpg"), r"a.jpg: the name must end in .png"),
+        (lambda s: ub.plot(s, "shapes", times="all"), "plot: times = 'all' must be numbers"),
+        (lambda s: ub.plot(s, "shapes", times=[]), "plot: times is empty"),
+        (lambda s: ub.plot(s, "history", 3), "plot: places = 3"),
+        (lambda s: ub.plot(s, "history", "end"), "plot: places = 'end' must be a list"),
+        (lambda s: ub.plot(s, "history", []), "plot: places is empty"),
+        (lambda s: ub.plot(s, "history", end(s), component="w"), "component = 'w'"),
+        (lambda s: ub.plot(s, "history", end(s), component="du/dt"), "static"),
+        (lambda s: ub.render(s, "a.jpg"), "a.jpg: the name must end in .png"),
         (lambda s: ub.render(s, "nowhere/a.png"), "no directory nowhere"),
         (lambda s: ub.render(s, "a.png", quantity="K"), "quantity = 'K' is not one of"),
         (lambda s: ub.render(s, "a.png", n=7), "n = 7"),
@@ -423,22 +330,5 @@ ELSEWHERE = ub.Camera(follow=ub.Body((0, 0), mass=1.0, inertia=1.0).middle)
     ],
 )
 def test_wrong_arguments_of_pictures_are_refused(portal, call, message):
-    with pytest.raises(ub.ArgumentError) as caught:
+    with raises(message):
         call(portal)
-    assert message in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "message"),
-    [
-        (("history", 3), {}, "places = 3"),
-        (("history", "end"), {}, "places = 'end' must be a list"),
-        (("history", []), {}, "places is empty"),
-        (("M",), {"n": "end"}, "n = 'end'"),
-        (("shapes",), {"times": "all"}, "times = 'all' must be numbers"),
-        (("shapes",), {"times": []}, "times is empty"),
-    ],
-)
-def test_wrong_arguments_are_named(portal, arguments, options, message):
-    with pytest.raises(ub.ArgumentError, match=f"plot: .*{message}"):
-        ub.plot(portal, *arguments, **options)
