@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Five-point differences of runs, with which tests compare derivatives of runs."""
 
+import inspect
+
 from mpi4py import MPI
 
 import numpy as np
@@ -24,6 +26,12 @@ unknown: it grows with large changes by higher derivatives and with small ones b
 def difference(value, x, h, weights=CENTRAL):
     """Difference quotient of a function of a number."""
     return sum(weight * value(x + k * h) for k, weight in weights.items()) / h
+
+
+def defaults(model):
+    """Parameters of a model with their default values, without those that are None."""
+    parameters = inspect.signature(model).parameters.values()
+    return {p.name: p.default for p in parameters if p.default is not None}
 
 
 def history(solution):

@@ -17,16 +17,13 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.display import compact_repr, counted, html_page
+from ufl_beam.display import compact_repr, html_page
 from ufl_beam.plotting import history_pictures
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
 FORCE = ub.PointLoad(BEAM.end, force=(0, -1e5), amplitude=lambda t: t)
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[FORCE])
-
-
-# -- one line ----------------------------------------------------------------------------------
 
 
 class Pair(NamedTuple):
@@ -36,40 +33,27 @@ class Pair(NamedTuple):
     second: object = 1.0
 
 
-def test_empty_fields_and_default_values_are_left_out():
-    assert compact_repr(Pair(2)) == "Pair(first=2)"
-    assert compact_repr(Pair({}, 2)) == "Pair(second=2)"
-    assert repr(ub.Newton()) == "Newton()"
-    assert repr(ub.Newton(rtol=1e-8)) == "Newton(rtol=1e-08)"
-
-
-def test_numbers_have_six_digits():
-    assert compact_repr(Pair(math.pi, np.float64(1) / 3)) == "Pair(first=3.14159, second=0.333333)"
-    assert compact_repr(Pair((0.1 + 0.2, 1))) == "Pair(first=(0.3, 1))"
-    assert repr(ub.Mesh(refine=Fraction(3, 2))) == "Mesh(refine=3/2)"
-
-
-def test_round_off_of_arcs_is_not_written():
-    arc = ub.Beam.arc((0, -1), 1.0, (np.pi, 0), SECTION)
-    assert str(arc.at(0.5)) == "beam.at(0.5) (0, 0)"
-    assert str(ub.ground(-1e-17, 1e-6)) == "ground (0, 1e-06)"
-
-
-def test_functions_have_their_names():
-    assert compact_repr(Pair(ub.ramp)) == "Pair(first=ramp)"
-
-
-def test_long_arrays_have_their_shapes():
-    assert compact_repr(Pair(np.arange(3.0))) == "Pair(first=[0, 1, 2])"
-    assert compact_repr(Pair(np.zeros((9, 3)))) == "Pair(first=array of shape (9, 3))"
-    assert compact_repr(Pair([*range(9)])) == "Pair(first=[0, 1, 2, 3, 4, 5, ...])"
-
-
-def test_parts_of_a_scene_are_counted():
-    assert counted((1, "body", "bodies"), (0, "joint", "joints"), (2, "load", "loads")) == (
-        "1 body, 2 loads"
-    )
-    assert repr(ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=1.0)])) == "<Scene: 1 body>"
+@pytest.mark.parametrize(
+    ("shown", "text"),
+    [
+        (compact_repr(Pair(2)), "Pair(first=2)"),
+        (compact_repr(Pair({}, 2)), "Pair(second=2)"),
+        (compact_repr(Pair(math.pi, np.float64(1) / 3)), "Pair(first=3.14159, second=0.333333)"),
+        (compact_repr(Pair((0.1 + 0.2, 1))), "Pair(first=(0.3, 1))"),
+        (compact_repr(Pair(ub.ramp)), "Pair(first=ramp)"),
+        (compact_repr(Pair(np.arange(3.0))), "Pair(first=[0, 1, 2])"),
+        (compact_repr(Pair(np.zeros((9, 3)))), "Pair(first=array of shape (9, 3))"),
+        (compact_repr(Pair([*range(9)])), "Pair(first=[0, 1, 2, 3, 4, 5, ...])"),
+        (repr(ub.Newton(rtol=1e-8)), "Newton(rtol=1e-08)"),
+        (repr(ub.Mesh(refine=Fraction(3, 2))), "Mesh(refine=3/2)"),
+        (str(ub.Beam.arc((0, -1), 1.0, (np.pi, 0), SECTION).at(0.5)), "beam.at(0.5) (0, 0)"),
+        (str(ub.ground(-1e-17, 1e-6)), "ground (0, 1e-06)"),
+        (repr(ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=1.0)])), "<Scene: 1 body>"),
+    ],
+)
+def test_one_line(shown, text):
+    """Numbers have six digits and no round-off, arrays their shapes, functions their names."""
+    assert shown == text
 
 
 # -- pages in notebooks ------------------------------------------------------------------------
@@ -91,17 +75,21 @@ def picture(page):
     from matplotlib.image import imread
 
     (data,) = re.findall('src="data:image/png;base64,(.*?)"', page)
-    return imread(BytesIO(b64decode(data)))
+    pixels = imread(BytesIO(b64decode(data)))
+    assert np.ptp(pixels) > 0.5
+    return pixels
 
 
 @pytest.mark.serial
 def test_a_scene_is_drawn():
     page = SCENE._repr_html_()
     assert "1 beam, 1 support, 1 load" in page
-    pixels = picture(page)
-    assert pixels.shape[1] > 600
-    assert np.ptp(pixels) > 0.5
+    assert picture(page).shape[1] > 600
     assert len(page) < 200_000
+    data, look = ub.plot(SCENE)._repr_png_()  # at the end of a cell
+    assert data.startswith(b"\x89PNG")
+    assert 300 < look["width"] < 900  # pixels of a page
+    assert html_page("<b>") == "<pre>&lt;b&gt;</pre>"
 
 
 @pytest.mark.serial
@@ -126,23 +114,21 @@ def test_small_displacements_are_magnified(solution, monkeypatch):
 
     monkeypatch.setattr(history_pictures, "draw_shapes", shapes)
     solution._repr_html_()
-    sink = ub.PrescribedDisplacement(BEAM.start, v=lambda t: -t, u=0, psi=0)
-    ub.simulate(ub.Scene([BEAM], supports=[sink]), ub.Static(), t=(0, 1), dt=1)._repr_html_()
-    still = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
-    ub.simulate(still, ub.Static(), t=(0, 1), dt=1)._repr_html_()
+    for v in (1.0, 0.0):
+        sink = ub.PrescribedDisplacement(BEAM.start, u=0, v=lambda t, v=v: -v * t, psi=0)
+        ub.simulate(ub.Scene([BEAM], supports=[sink]), ub.Static(), t=(0, 1), dt=1)._repr_html_()
     assert factors == [10, 1, 1]
 
 
 @pytest.mark.serial
-def test_modes_have_a_table(solution):
+def test_modes_have_a_table():
     modes = ub.modes(SCENE, 8, mesh=ub.Mesh(refine=2))
     page = modes._repr_html_()
     assert cells(page)[1:] == [[str(k), title] for k, title in enumerate(modes.titles)]
     picture(page)
     assert repr(modes) == f"<Modes: {'; '.join(modes.titles[:4])}; ...>"
-    # A period of a mode has no ledger
     page = modes.motion(0)._repr_html_()
-    assert cells(page) == []
+    assert cells(page) == []  # a period of a mode has no ledger
     picture(page)
 
 
@@ -183,30 +169,13 @@ def test_a_study_has_its_first_cases():
         assert line in page
 
 
-def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
-    def fail(*args, **options):
-        raise RuntimeError("<no> ink")
-
-    monkeypatch.setattr(history_pictures, "draw_shapes", fail)
-    page = solution._repr_html_()
-    assert "no picture: RuntimeError: &lt;no&gt; ink" in page
-    assert solution.summary()[0] in page
-    # Constraints that repeat are found when the scene is drawn
+def test_errors_of_pictures_leave_the_text():
+    """Constraints that repeat are found when the scene is drawn."""
     joints = [ub.Revolute(BEAM.end, ub.ground(2, 0)), ub.Revolute(BEAM.start, ub.ground(0, 0))]
     over = ub.Scene([BEAM], joints=[*joints, ub.Link(BEAM.start, BEAM.end)])
-    assert "no picture: ModelError" in over._repr_html_()
-    assert "1 beam, 3 joints" in over._repr_html_()
-
-
-def test_other_objects_are_shown_by_their_text():
-    assert html_page("<b>") == "<pre>&lt;b&gt;</pre>"
-
-
-@pytest.mark.serial
-def test_figures_are_pictures_at_the_end_of_a_cell():
-    data, look = ub.plot(SCENE)._repr_png_()
-    assert data.startswith(b"\x89PNG")
-    assert 300 < look["width"] < 900  # pixels of a page
+    page = over._repr_html_()
+    assert "no picture: ModelError" in page
+    assert "1 beam, 3 joints" in page
 
 
 @pytest.mark.serial

@@ -68,8 +68,6 @@ def require_lines(made):
 
 def test_the_common_objects_are_shown_in_one_line(names):
     require_lines(names)
-    with pytest.raises(AssertionError, match=r"wrong: <ufl_beam\.own\.Wrong object at"):
-        require_lines({"wrong": type("Wrong", (), {"__module__": "ufl_beam.own"})()})
 
 
 MEMBERS = [
@@ -90,17 +88,3 @@ def test_examples_of_members(owner, names, tmp_path, monkeypatch):
         if name == owner:
             thing = inspect.getattr_static(ALL[owner], member)
             known = run(f"{owner}.{member}", thing, known)
-
-
-def test_an_example_can_fail(names):
-    """With the name of its owner, the line and both outputs."""
-
-    class Wrong:
-        """>>> beam.cells
-        5
-        """
-
-    with pytest.raises(AssertionError, match=r"(?s)Wrong.*beam.cells.*Expected:\s+5\s+Got:\s+4"):
-        run("Wrong", Wrong, names)
-    with pytest.raises(AssertionError, match="docstring of object has no example"):
-        run("object", object, names)

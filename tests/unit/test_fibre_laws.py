@@ -6,20 +6,20 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers import raises, require_restart
+from helpers import raises
 from scenes import clamped
 from uniaxial_points import LENGTH, Bars, C, histories
 
 import ufl_beam as ub
 import ufl_beam.structures as st
 
-SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(0.8)]
+SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(0.8)]
 each_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 
 
-def followed(law, strains, scheme=SCHEMES[0], **bars):
+def followed(law, strains, scheme=SCHEMES[0]):
     """Stresses after each step of bars with the strains (steps, bars), and the bars."""
-    points, stresses = Bars(strains.shape[1], law, None, scheme, **bars), []
+    points, stresses = Bars(strains.shape[1], law, None, scheme), []
     for strain in strains:
         points.step(strain)
         stresses.append(points.stress())
@@ -70,10 +70,8 @@ STEELS = {
 @each_scheme
 @pytest.mark.parametrize("steel", STEELS)
 def test_menegotto_pinto_over_random_paths(steel, scheme):
-    """[calc] Stresses and dissipated energies of 100 random walks, with partial loops; round-off.
-
-    They depend on the strains at the ends of steps, not on the scheme.
-    """
+    """[calc] Stresses and dissipated energies of 100 random walks, with partial loops."""
+    # They depend on the strains at the ends of steps, not on the scheme.
     parameters, strains = STEELS[steel], histories(100, steps=60)
     found, bars = followed(st.MenegottoPinto(*parameters), strains, scheme)
     expected = np.column_stack([steel02(path, C, *parameters) for path in strains.T])
@@ -81,23 +79,6 @@ def test_menegotto_pinto_over_random_paths(steel, scheme):
     lost = work_by_means(strains, expected) - expected[-1] ** 2 / (2 * C)
     assert bars.dissipated()[0] / LENGTH == pytest.approx(lost, abs=1e-12 * C)
     assert lost.max() > 1.0
-
-
-def test_menegotto_pinto_in_small_steps_dissipates_the_area_of_its_loops():
-    """[calc] Second order: a quarter of the error for half the step, to 1e-6 by extrapolation."""
-
-    def turned(n):
-        return 0.05 * np.interp(np.arange(1, 4 * n + 1) / n, range(5), [0, 1, -0.4, 0.7, 0.6])
-
-    def lost(n):
-        return followed(st.MenegottoPinto(3.0, 0.02), turned(n)[:, None])[1].dissipated()[0][0]
-
-    coarse, middle, fine = (lost(n) for n in (400, 800, 1600))
-    strains = turned(6400)
-    stresses = np.array(steel02(strains, C, 3.0, 0.02))
-    exact = work_by_means(strains[:, None], stresses[:, None])[0] - stresses[-1] ** 2 / (2 * C)
-    assert 3.8 < (coarse - middle) / (middle - fine) < 4.2
-    assert (4 * fine - middle) / 3 == pytest.approx(exact * LENGTH, rel=1e-6)
 
 
 def test_errors_of_equilibrium_are_no_reversals():
@@ -225,7 +206,7 @@ def test_concrete_over_random_paths(name, scheme):
 
 
 @pytest.mark.parametrize("law", [ub.Softening, ub.LinearSoftening])
-@pytest.mark.parametrize("cells", [1, 4, 16])
+@pytest.mark.parametrize("cells", [1, 16])
 def test_a_broken_bar_dissipates_the_fracture_energy(law, cells):
     """[closed] G times the area, for any number of cells, of which the first is 10 % weaker."""
     t, G, L = 2.5e6, 100.0, 0.4  # Pa, J/m², m; a bar of G E/t² = 0.48 m would snap back
@@ -247,59 +228,6 @@ def test_a_broken_bar_dissipates_the_fracture_energy(law, cells):
     assert run.energy.lost["plastic"][-1] == pytest.approx(G * 4e-4, rel=1e-6)
 
 
-# -- in scenes -----------------------------------------------------------------------------------
-
-LAWS = {
-    "steel": st.MenegottoPinto(12e6, 0.02, a1=0.1, a3=0.1),
-    "Kent-Park": st.KentPark(30e6, 6e6, 0.01, ub.Softening(2e6, 200.0)),
-    "Mander": st.Mander(30e6, 0.003, 0.01, ub.LinearSoftening(2e6, 200.0)),
-}
-each_law = pytest.mark.parametrize("law", LAWS)
-
-
-def column(law):
-    """A column under an axial force, pushed to and fro beyond yielding and cracking; its spring."""
-    fibres = ub.Fibres(law, number=6)
-    section = ub.Section.rectangle(0.3, 0.3, E=30e9, nu=0.2, rho=2.5e5, fibres=fibres)
-    beam = ub.Beam((0, 0), (0, 2), section, cells=2)
-    spring = ub.Slide(ub.ground(0, 2), beam.end, ub.Spring(1e6), axis=(1, 0))
-    push = ub.Table([0, 0.2, 0.6, 0.9], [0.0, 1.0, -1.0, 0.6])
-    loads = [
-        ub.PointLoad(beam.end, force=(0, -600e3), amplitude=ub.ramp(0.2)),
-        ub.PointLoad(beam.end, force=(30e3, 0), amplitude=push),
-    ]
-    return clamped(beam, loads=loads, connectors=[spring]), spring
-
-
-def stepped(scene, scheme, t=(0, 0.9), **options):
-    """A run in steps of a twelfth of the first period."""
-    return ub.simulate(scene, scheme, t=t, dt=0.02, **options)
-
-
-@pytest.mark.parametrize(
-    ("law", "scheme"),
-    [("steel", ub.EnergyMomentum()), ("Kent-Park", ub.Static()), ("Mander", ub.EnergyMomentum())],
-    ids=str,
-)
-def test_the_reference_solver_finds_the_same(law, scheme, as_by_reference):
-    """Displacements and energies to the tolerance of both solvers; the ledger closes."""
-    scene, _ = column(LAWS[law])
-    found = stepped(scene, scheme, (0, 0.4), newton=ub.Newton(rtol=1e-12))
-    as_by_reference(found)
-    lost = found.energy["plastic"]
-    assert lost[-1] > 5.0  # J
-    if isinstance(scheme, ub.EnergyMomentum):
-        assert found.energy.worst < 1e-9
-    if law != "steel":
-        assert np.diff(lost).min() >= -1e-12 * lost[-1]  # round-off
-
-
-@each_law
-def test_a_resumed_run_is_the_same(law, tmp_path):
-    scene, spring = column(LAWS[law])
-    require_restart(stepped, scene, [spring], ub.EnergyMomentum(), tmp_path, 0.8)
-
-
 # -- refusals ------------------------------------------------------------------------------------
 
 
@@ -310,24 +238,14 @@ def section_of(law, E=30e9):
 @pytest.mark.parametrize(
     ("make", "parts"),
     [
-        (lambda: st.MenegottoPinto(5e8, 1.0), ["MenegottoPinto: hardening = 1 must lie"]),
-        (lambda: st.MenegottoPinto(5e8, 0.01, cR1=1.0), ["MenegottoPinto: cR1 = 1 must lie"]),
-        (lambda: st.MenegottoPinto(5e8, 0.01, a2=0.0), ["MenegottoPinto: a2 = 0 must be positive"]),
-        (lambda: st.KentPark(-3e7, 0.0, 0.01), ["KentPark: strength", "must be positive"]),
-        (lambda: st.KentPark(3e7, 4e7, 0.01), ["residual = 4e+07", "exceed the strength"]),
-        (lambda: st.KentPark(3e7, 6e6, 0.01, 2e6), ["KentPark: tension", "2000000"]),
         (
             lambda: section_of(st.KentPark(3e7, 6e6, 0.0015)),
             ["KentPark: ultimate = 0.0015", "2 strength/E = 0.002", "turn back"],
         ),
-        (lambda: st.KentPark(3e7, 6e6, 0.01, ub.Softening(2e6, -1.0)), ["fracture_energy"]),
-        (lambda: st.KentPark.confined(30.0), ["KentPark.confined: strength = 30"]),
-        (lambda: st.Mander(3e7, 0.004, 0.007), ["spalling = 0.007", "exceed 2 strain = 0.008"]),
         (
             lambda: section_of(st.Mander(3e7, 0.002), E=15e9),
             ["Mander: E = 1.5e+10", "1.02 strength/strain = 1.53e+10", "turns back"],
         ),
-        (lambda: st.Mander.confined(30e6, -1.0), ["Mander.confined: pressure"]),
     ],
 )
 def test_laws_that_turn_back_are_refused(make, parts):
@@ -338,10 +256,10 @@ def test_laws_that_turn_back_are_refused(make, parts):
 def test_a_cell_that_is_too_long_for_the_fracture_energy_is_refused():
     """[closed] Longest cell: 2 G E/t² = 0.96 m; the message names the place."""
     law = st.KentPark(30e6, 6e6, 0.01, ub.Softening(2.5e6, 100.0))
-    beam = ub.Beam((0, 0), (0, 2), section_of(law), cells=2, name="column")
+    scene = clamped(ub.Beam((0, 0), (0, 2), section_of(law), cells=2, name="column"))
     with raises("column at (0, 0.5): KentPark: tension", "1 m", "0.96 m", "above 104"):
-        ub.simulate(clamped(beam), ub.Static(), t=(0, 1), dt=0.5)
-    ub.simulate(clamped(beam), ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=2))
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=2))
 
 
 def test_confined_strengths():

@@ -6,6 +6,7 @@ checkpoints.  If runs no longer continue from a stored solution, let the test ex
 """
 
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,18 +35,16 @@ def test_a_stored_solution_is_read_and_not_continued(name):
     old = ub.Solution.load(FILES / f"{name}.solution", scene=scene())
     new = simulated(scheme, scene=scene)
     assert old.version == "0.1.0"
-    size = np.abs(new.q).max()
-    np.testing.assert_allclose(old.q, new.q, atol=SAME * size, rtol=0.0)
-    for account in ("state", "supplied", "lost"):
-        before, now = (getattr(x.energy, account) for x in (old, new))
-        assert list(before) == list(now)
-        for entry, values in now.items():
-            np.testing.assert_allclose(
-                before[entry], values, atol=SAME * np.abs(new.energy["stored"]).max(), rtol=0.0
-            )
+    alone = ub.Solution.load(FILES / f"{name}.solution")  # without the script
+    assert alone.q.tobytes() == old.q.tobytes()
+    assert [beam.cells for beam in alone.scene.beams] == [beam.cells for beam in new.scene.beams]
+    near = partial(np.testing.assert_allclose, rtol=0.0)
+    near(old.q, new.q, atol=SAME * np.abs(new.q).max())
+    assert [*old.energy] == [*new.energy]
+    for entry, values in new.energy.items():
+        near(old.energy[entry], values, atol=SAME * np.abs(new.energy["stored"]).max())
     forces = new.cell_resultants(-1)
-    scale = np.abs(forces).max()
-    np.testing.assert_allclose(old.cell_resultants(-1), forces, atol=1e-7 * scale, rtol=0.0)
+    near(old.cell_resultants(-1), forces, atol=1e-7 * np.abs(forces).max())
     with raises("start: version 0.1.0 of ufl_beam", "Run again from the beginning"):
         continued(old, scheme)
 
@@ -65,12 +64,6 @@ def test_internal_variables_in_another_form_are_refused(table, owner):
         continued(old, ub.EnergyMomentum())
 
 
-@pytest.mark.parametrize("name", RUNS)
-def test_a_stored_solution_is_read_without_the_script(name):
-    old = ub.Solution.load(FILES / f"{name}.solution")
-    assert (old.scene["deck" if name == "bridge" else "mast"].cells, len(old)) == (4, 21)
-
-
 @pytest.mark.serial
 def test_a_stored_study_is_read_and_not_continued(tmp_path):
     path = Path(shutil.copy(FILES / "squares.study", tmp_path))
@@ -84,7 +77,7 @@ def test_a_stored_study_is_read_and_not_continued(tmp_path):
 
 
 @pytest.mark.serial
-def test_a_checkpoint_with_recorders_of_an_earlier_format_is_refused(tmp_path):
+def test_a_checkpoint_of_an_earlier_format_is_refused(tmp_path):
     """Before the run, with the version that wrote it and the remedy; all files stay."""
     names = "bridge.checkpoint", "bridge.csv"
     for name in names:

@@ -2,22 +2,22 @@
 """Section forces along cells: closed forms, and equilibrium with all that acts on a beam."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import raises
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.errors import ArgumentError
 
 STIFF = ub.Section(EA=1e10, GA=1e10, EI=1e9, rhoA=100.0, rhoI=1.0)
 SOFT = ub.Section.rectangle(b=0.02, h=0.02, E=1e8, nu=0.3, rho=7850.0)
 SOLVED = 1e-8  # part of the largest value that the tolerance of the solver, 1e-10, leaves at most
 
 
-def static(scene, degree=1, **options):
-    times = {"t": (0, 1), "dt": 0.25, **options}
-    return ub.simulate(scene, ub.Static(), mesh=ub.Mesh(degree=degree), **times)
+def static(scene, degree=1):
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, mesh=ub.Mesh(degree=degree))
 
 
 def supported(cells, *loads, length=6.0):
@@ -31,17 +31,16 @@ def close(found, exact, part=SOLVED):
     np.testing.assert_allclose(found, exact, atol=part * np.max(np.abs(exact)), rtol=0)
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
-@pytest.mark.parametrize("cells", [1, 3, 4])
+@pytest.mark.parametrize(("cells", "degree"), [(1, 1), (3, 1), (4, 1), (1, 2), (1, 3), (4, 3)])
 def test_simply_supported_beam(cells, degree):
     """[closed] M = w x (l - x)/2, V = w (x - l/2); the deflection changes 1e-8 of them."""
     scene, beam = supported(cells, lambda b: ub.LineLoad(b, force=(0, -10e3)))
-    s, _, V, M = static(scene, degree).diagram(beam)
+    solution = static(scene, degree)
+    assert not np.any(solution.diagram(beam, 0)[1:])  # the initial state bears nothing
+    s, _, V, M = solution.diagram(beam)
     x = 6.0 * s
     close(M, 10e3 * x * (6.0 - x) / 2)
     close(V, 10e3 * (x - 3.0))
-    if cells != 3:  # a point in the middle
-        assert f"{M.max():.4g}" == "4.5e+04"
 
 
 def test_weight_with_a_force_and_a_couple_along_the_beam():
@@ -60,59 +59,34 @@ def test_weight_with_a_force_and_a_couple_along_the_beam():
     close(M, left * x - 500.0 * x - 1e3 * x**2 / 2 - 4e3 * (x - 2.0) * after, 1e-7)
 
 
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_moments_are_in_equilibrium_when_beams_turn(degree):
-    """A cantilever that bends by a right angle: M = P (x_end - x), with displaced points."""
-    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=6)
-    push = ub.PointLoad(beam.end, force=(0.0, 8.0), amplitude=lambda t: t)
-    scene = clamped(beam, loads=[push])
-    solution = static(scene, degree)
-    x = solution.shape(beam)[:, 0]
-    exact = 8.0 * (x[-1] - x)
-    diagram = solution.diagram(beam, points=2)
-    close(diagram.M, np.column_stack([exact[:-1], exact[1:]]).ravel())
-    np.testing.assert_allclose(np.hypot(diagram.N, diagram.V), 8.0, rtol=SOLVED)
-
-
 def test_large_rotations_under_weight():
     """A hanging beam, degree 1: between vertices, too, all parts are in equilibrium."""
     beam = ub.Beam((0, 0), (1, 0.3), SOFT, cells=5)
-    scene = clamped(beam, loads=[ub.Gravity()])
-    solution = static(scene)
+    solution = static(clamped(beam, loads=[ub.Gravity()]))
     s, N, V, M = solution.diagram(beam, points=3)
-    q = solution.displacement(beam.start)[-1]
-    places = [solution.position(beam.at(a))[-1] for a in s]
-    length = math.hypot(1.0, 0.3)
-    weight = SOFT.rhoA * 9.81 * length * (1 - s)
-    np.testing.assert_allclose(np.hypot(N, V), weight, atol=SOLVED * weight[0])
-    assert abs(q).max() == 0
+    x = np.array([solution.position(beam.at(a))[-1, 0] for a in s])
+    weight = SOFT.rhoA * 9.81 * math.hypot(1.0, 0.3)
+    np.testing.assert_allclose(np.hypot(N, V), weight * (1 - s), atol=SOLVED * weight)
     # Moment of the weight beyond, at the mean of the displaced axis beyond: linear in each cell
-    x = np.array(places)[:, 0]
     beyond = np.array([np.trapezoid(x[k:], s[k:]) - x[k] * (1 - s[k]) for k in range(len(s))])
-    close(M, -SOFT.rhoA * 9.81 * length * beyond)
+    close(M, -weight * beyond)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_continuous_in_a_rotating_frame(degree):
-    """N and M of a turning blade end with zero, and have no steps.
-
-    [closed] N = rhoA Ω² (r_end² - r²)/2 but for the stretch, 1e-4.
-    """
+    """N and M of a turning blade end with zero, and have no steps."""
+    # [closed] N = rhoA Ω² (r_end² - r²)/2 but for the stretch, 1e-4.
     beam = ub.Beam((0.2, 0), (1.2, 0), STIFF, cells=4)
-    scene = clamped(beam, loads=[ub.RotatingFrame(rate=8.0)])
-    s, N, _, _ = static(scene, degree).diagram(beam)
+    s, N, *_ = static(clamped(beam, loads=[ub.RotatingFrame(8.0)]), degree).diagram(beam)
     close(N, 100.0 * 64.0 * (1.2**2 - (0.2 + s) ** 2) / 2, 1e-6)
 
 
 def test_diagrams_of_a_quarter_ring():
-    """[closed] A quarter of a ring, φ from its end: N = -P sin φ, V = P cos φ, size of M P r sin φ.
-
-    Chords of 1/16 of a right angle: N and V are exact to the square of their angle, 0.1²/8.
-    """
+    """[closed] A quarter of a ring, φ from its end: N = -P sin φ, V = P cos φ, |M| = P r sin φ."""
+    # Chords of 1/16 of a right angle: N and V are exact to the square of their angle, 0.1²/8.
     angle, radius, force = np.pi / 2, 2.0, 1e3
     ring = ub.Beam.arc((0, 0), radius, (0.0, angle), STIFF, cells=16)
-    load = ub.PointLoad(ring.end, force=(0, -force))
-    scene = clamped(ring, loads=[load])
+    scene = clamped(ring, loads=[ub.PointLoad(ring.end, force=(0, -force))])
     s, N, V, M = static(scene).diagram(ring)
     φ = angle * (1 - s)
     close(N, -force * np.sin(φ), 1.3e-3)
@@ -123,56 +97,39 @@ def test_diagrams_of_a_quarter_ring():
 
 def test_forces_jump_at_corners():
     """An L of one beam: N and V change places at its corner."""
-    section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
-    bent = ub.Beam.polyline([(0, 0), (0, 2), (2, 2)], section, cells=4)
-    load = ub.PointLoad(bent.end, force=(0, -1e3))
-    scene = clamped(bent, loads=[load])
+    bent = ub.Beam.polyline([(0, 0), (0, 2), (2, 2)], STIFF, cells=4)
+    scene = clamped(bent, loads=[ub.PointLoad(bent.end, force=(0, -1e3))])
     s, N, V, _ = static(scene).diagram(bent)
     post = np.arange(len(s)) < 18
     close(N, np.where(post, -1e3, 0.0), 1e-4)
     close(V, np.where(post, 0.0, -1e3), 1e-4)
 
 
-def test_the_initial_state_bears_nothing():
-    scene, beam = supported(4, lambda b: ub.LineLoad(b, force=(0, -10e3)))
-    assert not np.any(static(scene).diagram(beam, 0)[1:])
-
-
 def test_beams_in_free_fall_bear_nothing():
     beam = ub.Beam((0, 0), (2, 0), STIFF, cells=4)
-    fall = ub.simulate(
-        ub.Scene([beam], loads=[ub.Gravity()]), ub.EnergyMomentum(), t=(0, 1), dt=0.25
-    )
+    scene = ub.Scene([beam], loads=[ub.Gravity()])
+    fall = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.25)
     # Round-off of EA and EI times strains of displacements of 5 m
     assert np.abs(fall.diagram(beam)[1:]).max() < 1e-4
 
 
-def test_yielding_beams_and_hinges(shared_path):
-    """A propped cantilever with a plastic hinge: its moment is the limit, w x parabola elsewhere.
-
-    A file of the solution has the same values.
-    """
+def test_yielding_beams_and_hinges():
+    """A propped cantilever with a plastic hinge: its moment is the limit, elsewhere a parabola."""
     law = ub.ElastoPlastic(yield_limit=20e3, isotropic=1.0)
-    section = ub.Section(
-        EA=1e10, GA=1e10, EI=1e9, bending=ub.ElastoPlastic(yield_limit=30e3, isotropic=1e8)
-    )
+    section = replace(STIFF, bending=ub.ElastoPlastic(yield_limit=30e3, isotropic=1e8))
     beam = ub.Beam((0, 0), (6, 0), section, cells=4, hinges={0.0: law}, name="prop")
     load = ub.LineLoad(beam, force=(0, -10e3), amplitude=lambda t: t)
-    supports = [ub.Clamped(beam.start), ub.Roller(beam.end, along=(1, 0))]
-    solution = static(ub.Scene([beam], supports=supports, loads=[load]))
+    solution = static(clamped(beam, ub.Roller(beam.end, along=(1, 0)), loads=[load]))
     assert solution.material(beam).plastic.any()  # it yields in the field
     diagram = solution.diagram(beam)
     x = 6.0 * diagram.s
     close(diagram.M, 10e3 * x * (6.0 - x) / 2 - 20e3 * (1 - x / 6.0), 1e-5)
-    solution.save(shared_path / "prop.h5")
-    loaded = ub.Solution.load(shared_path / "prop.h5")
-    assert np.array_equal(loaded.diagram(loaded.scene["prop"]), diagram)
 
 
 def test_wrong_points_and_beams_are_refused():
     scene, beam = supported(2, lambda b: ub.Gravity())
     solution = static(scene)
-    with pytest.raises(ArgumentError, match=r"diagram: points = 1 "):
+    with raises("diagram: points = 1 "):
         solution.diagram(beam, points=1)
-    with pytest.raises(ArgumentError, match="not in the scene"):
+    with raises("not in the scene"):
         solution.diagram(ub.Beam((0, 0), (1, 0), STIFF))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Damping from a history: peaks, logarithmic decrement, and which law their decay follows."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,6 +19,8 @@ from ufl_beam.structures.free_decay import (
 
 OMEGA = 2 * np.pi
 """A period of one second."""
+
+T = np.linspace(0, 10, 1001)
 
 
 def viscous(t, decrement, phase=-1.0):
@@ -47,32 +50,25 @@ def test_a_parabola_is_found_exactly_whatever_the_steps():
 
 @pytest.mark.parametrize(("top", "time"), [([1, 1], 2.5), ([1, 1, 1], 3.0), ([1, 1, 1, 1], 3.0)])
 def test_a_flat_top_is_one_peak(top, time):
-    # In the middle; of four equal samples at the lower of the middle ones
-    x = [0, 0.5, *top, 0.5, 0]
+    """In the middle; of four equal samples at the lower of the middle ones; ends are no maxima."""
+    x = [1, 0, 0.5, *top, 0.5, 0, 1]
     times, amplitudes = peaks(np.arange(len(x)), x)
-    assert times == pytest.approx([time], abs=1e-14)
+    assert times == pytest.approx([time + 1], abs=1e-14)
     assert amplitudes == pytest.approx([1 if len(top) > 2 else 1 + 0.5 / 8], abs=1e-14)
 
 
-def test_ends_are_no_maxima():
-    t = np.linspace(0, 3, 301)
-    times, _ = peaks(t, np.cos(OMEGA * t))  # maxima at 0, 1, 2, 3
-    assert times == pytest.approx([1, 2], abs=1e-12)  # samples, symmetric neighbours
-
-
-def test_one_period_apart_even_if_the_equilibrium_is_wrong():
+def test_minima_and_moved_histories_have_the_decrement_of_maxima():
     t = np.linspace(0, 8, 801)
-    right, wrong = (peaks(t, viscous(t, 0.1) + 0.2, about)[0] for about in (0.2, 0.0))
-    assert list(right) == list(wrong)
-    # The same point between samples in each period, hence the same parabola
-    assert np.diff(right) == pytest.approx(np.ones(7), abs=1e-10)
-
-
-def test_minima_have_the_decrement_of_maxima():
-    t = np.linspace(0, 8, 801)
-    upper, lower = damping(t, viscous(t, 0.1)), damping(t, -viscous(t, 0.1))
+    x = viscous(t, 0.1)
+    upper, lower, moved = damping(t, x), damping(t, -x), damping(t + 100, x - 3, about=-3)
     assert lower.times[0] - upper.times[0] == pytest.approx(0.5, abs=1e-6)  # both parabolas
     assert lower.decrement == pytest.approx(upper.decrement, abs=1e-10)
+    assert upper.better == "exponential"
+    # The cosine at a maximum is that of arctan(δ/2π); the fit is to 1e-8
+    height = np.exp(-0.1 * upper.times[0]) / np.hypot(1, 0.1 / OMEGA)
+    assert upper.exponential.initial == pytest.approx(height, rel=1e-6)
+    assert moved.times == pytest.approx(upper.times + 100, abs=1e-10)
+    assert moved.amplitudes == pytest.approx(upper.amplitudes, abs=1e-14)  # round-off of 3
 
 
 def test_high_frequency_riding_on_the_vibration():
@@ -100,8 +96,8 @@ def interpolation_error(decrement, dt):
     return 1.1 * 0.375 / 6 * θ**3 * (2 * ζ + 1.5 * θ)
 
 
-@pytest.mark.parametrize("decrement", [0.0, 0.01, 0.077, 0.3])
-@pytest.mark.parametrize("dt", [0.05, 0.013, 0.0031])
+@pytest.mark.parametrize("decrement", [0.0, 0.01, 0.3])
+@pytest.mark.parametrize("dt", [0.05, 0.0031])
 def test_a_damped_cosine(decrement, dt):
     t = np.arange(0, 7, dt)
     decay = damping(t, viscous(t, decrement), prominence=0.01)
@@ -146,23 +142,22 @@ def test_damping_ratio_of_arrays_zero_and_growth():
     assert damping_ratio(OMEGA * ζ / np.sqrt(1 - ζ**2)) == pytest.approx(ζ, rel=1e-14)
 
 
-@pytest.mark.parametrize(("δ", "ζ"), [(0.077, 0.01225), (0.062, 0.00987), (0.038, 0.00605)])
-def test_ratios_of_the_first_decrements_of_table_2(δ, ζ):
-    assert damping_ratio(δ) == pytest.approx(ζ, abs=5e-6)  # the last digit
-
-
-@pytest.mark.parametrize("row", ["horizontal", "vertical"])
-def test_damping_ratios_of_table_2(row):
-    δ = {
-        "horizontal": [0.077, 0.062, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003],
-        "vertical": [0.076, 0.061, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003],
-    }
-    ζ = {
-        "horizontal": [0.012, 0.010, 0.006, 0.004, 0.003, 0.002, 0.001, 0.001],
-        "vertical": [0.012, 0.010, 0.006, 0.004, 0.003, 0.002, 0.001, 0.000],
-    }
-    # Both are printed to 0.001; half of it each
-    assert damping_ratio(δ[row]) == pytest.approx(np.array(ζ[row]), abs=5e-4 * (1 + 1 / OMEGA))
+def test_damping_ratios_of_table_2():
+    """Both are printed to 0.001, half of it each; the first ones also to five digits."""
+    for δ, ζ in (
+        (
+            [0.077, 0.062, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003],
+            [0.012, 0.010, 0.006, 0.004, 0.003, 0.002, 0.001, 0.001],
+        ),
+        (
+            [0.076, 0.061, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003],
+            [0.012, 0.010, 0.006, 0.004, 0.003, 0.002, 0.001, 0.000],
+        ),
+    ):
+        assert damping_ratio(δ) == pytest.approx(np.array(ζ), abs=5e-4 * (1 + 1 / OMEGA))
+    assert damping_ratio([0.077, 0.062, 0.038]) == pytest.approx(
+        np.array([0.01225, 0.00987, 0.00605]), abs=5e-6
+    )
 
 
 # -- the two laws --------------------------------------------------------------------------------
@@ -182,18 +177,6 @@ def test_dry_friction_is_linear():
     assert decay.linear.rms <= ε
     assert decay.evidence > 1e10
     assert (np.diff(decay.decrements) > 0).all()  # the same amount is more and more of the rest
-
-
-def test_viscous_damping_is_exponential():
-    t = np.linspace(0, 10, 10001)
-    decay = damping(t, viscous(t, 0.1))
-    assert decay.better == "exponential"
-    assert decay.evidence > 1e10
-    # The cosine at a maximum is that of arctan(δ/2π); the fit is to 1e-8
-    height = np.exp(-0.1 * decay.times[0]) / np.hypot(1, 0.1 / OMEGA)
-    assert decay.exponential.initial == pytest.approx(height, rel=1e-7)
-    assert decay.exponential.rate == pytest.approx(0.1, rel=1e-7)
-    assert decay.fitted_ratio == pytest.approx(decay.ratio, rel=1e-7)
 
 
 def test_the_linear_law_is_the_regression_by_hand():
@@ -232,62 +215,35 @@ def test_intervals_hold_the_truth_as_often_as_they_say(law):
         assert ratios / 400 == pytest.approx(0.95, abs=0.033)
 
 
-def test_noise_on_the_history():
-    rng = np.random.default_rng(62)
-    t = np.linspace(0, 10, 401)
-    inside = 0
-    for _ in range(200):
-        decay = damping(t, viscous(t, 0.1) + 0.003 * rng.standard_normal(401))
-        law = decay.exponential
-        inside += abs(law.rate - 0.1) < law.rate_95 < 0.01
-        assert abs(decay.fitted_ratio - damping_ratio(0.1)) < 0.001
-        assert decay.better == "exponential"
-    # Of the 95 %, three deviations √(0.95 0.05 / 200) = 0.015 of a binomial mean
-    assert inside / 200 == pytest.approx(0.95, abs=0.046)
-
-
-def test_constant_amplitudes_have_no_damping():
+def test_constant_and_growing_amplitudes():
     decay = fit_decay(np.arange(5), np.ones(5))
     assert decay.decrement == decay.ratio == 0
     assert decay.linear.rate == 0
     assert abs(decay.exponential.rate) < 1e-15
     assert decay.evidence == 1  # neither
-
-
-def test_growth_is_negative_damping():
     decay = fit_decay(np.arange(5), np.exp(0.2 * np.arange(5)))
     assert decay.decrement == pytest.approx(-0.2, rel=1e-14)
     assert decay.fitted_ratio == pytest.approx(damping_ratio(-0.2), rel=1e-8)
 
 
-# -- units, offset -------------------------------------------------------------------------------
+# -- units, text ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("second", "metre"), [(1e-6, 1e9), (3.7e4, 1e-12)])
-def test_units_do_not_matter(second, metre):
-    t = np.linspace(0, 10, 1001)
-    x = viscous(t, 0.1) + 0.01 * np.cos(5.3 * t)
-    one, other = damping(t, x), damping(second * t, metre * x)
-    same = {"rel": 1e-7}  # the fit is to 1e-8
-    for name in ("decrement", "decrements", "ratio", "fitted_ratio", "fitted_ratio_95"):
-        assert getattr(other, name) == pytest.approx(getattr(one, name), **same), name
-    assert (other.better, other.evidence) == (one.better, pytest.approx(one.evidence, **same))
-    assert other.period == pytest.approx(second * one.period, **same)
+def test_units_do_not_matter():
+    """The fit is to 1e-8."""
+    second, metre = 1e-6, 1e9
+    x = viscous(T, 0.1) + 0.01 * np.cos(5.3 * T)
+    one, other = damping(T, x), damping(second * T, metre * x)
+    near = partial(pytest.approx, rel=1e-7)
+    for name in ("decrement", "decrements", "ratio", "fitted_ratio", "fitted_ratio_95", "evidence"):
+        assert getattr(other, name) == near(getattr(one, name)), name
+    assert other.better == one.better
+    assert other.period == near(second * one.period)
     for law, unit in (("linear", metre / second), ("exponential", 1 / second)):
         a, b = getattr(one, law), getattr(other, law)
-        assert (b.rate, b.rate_95) == pytest.approx((unit * a.rate, unit * a.rate_95), **same)
-        assert (b.initial, b.initial_95) == pytest.approx(
-            (metre * a.initial, metre * a.initial_95), **same
-        )
-        assert b.rms == pytest.approx(metre * a.rms, **same)
-
-
-def test_offsets_of_time_and_value_do_not_matter():
-    t = np.linspace(0, 10, 1001)
-    one, other = damping(t, viscous(t, 0.1)), damping(t + 100, viscous(t, 0.1) - 3, about=-3)
-    assert other.times == pytest.approx(one.times + 100, abs=1e-10)
-    assert other.amplitudes == pytest.approx(one.amplitudes, abs=1e-14)  # round-off of 3
-    assert other.exponential.rate == pytest.approx(one.exponential.rate, rel=1e-8)
+        assert (b.rate, b.rate_95) == near((unit * a.rate, unit * a.rate_95))
+        assert (b.initial, b.initial_95) == near((metre * a.initial, metre * a.initial_95))
+        assert b.rms == near(metre * a.rms)
 
 
 def test_it_can_be_read():
@@ -305,72 +261,43 @@ def test_it_can_be_read():
 
 
 @pytest.mark.parametrize(
-    ("t", "x", "says"),
+    ("call", "words"),
     [
-        ([0, 1, 2], [0, 1], ("3 t and 2 x; give the same number of each",)),
-        ([0, 2, 1], [0, 1, 0], ("t must increase", "t[1] = 2 is followed by 1")),
-        ([0, 1, 1], [0, 1, 0], ("t must increase", "t[1] = 1 is followed by 1")),
-        ([0, 1, 2], [0, np.nan, 0], ("x[1] = nan is not finite",)),
-        ([0, 1, np.inf], [0, 1, 0], ("t[2] = inf is not finite",)),
-        ([0, 1, 2], [[0, 1, 0]], ("x has shape (1, 3)",)),
-        ([0, 1, 2], ["a", 1, 0], ("x = ['a', 1, 0] must be numbers",)),
-        ([0, 1, 2], None, ("x = None must be numbers",)),
+        (lambda: peaks([0, 1, 2], [0, 1]), ["3 t and 2 x; give the same number of"]),
+        (lambda: peaks([0, 1, 1], [0, 1, 0]), ["t must increase", "t[1] = 1 is followed by 1"]),
+        (
+            lambda: damping(T[:150], viscous(T[:150], 0.1)),
+            ["peaks found: 2, needed: 3", "longer history", "prominence = 0.05"],
+        ),
+        (lambda: damping(T[:0], T[:0]), ["peaks found: 0"]),
+        (lambda: damping(T, 0 * T), ["peaks found: 0"]),
+        (
+            lambda: logarithmic_decrement([1.0, 0.0]),
+            ["amplitudes[1] = 0 must be positive", "from the equilibrium"],
+        ),
+        (  # exp(-0.1 · 3.16) = 0.73, next 0.66
+            lambda: damping(T, viscous(T, 0.1), about=0.7),
+            ["amplitudes[4] = -0.", "must be positive", "about"],
+        ),
+        (lambda: logarithmic_decrement([1.0]), ["amplitudes given: 1, needed: 2"]),
+        (lambda: fit_decay([0, 1], [2, 1]), ["amplitudes given: 2, needed: 3"]),
+        (lambda: fit_decay([0, 1, 2], [4, 3, 2, 1]), ["3 t and 4 amplitudes"]),
+        (
+            lambda: fit_decay([0, 1, 2], [440, 0.702, 1.38e6]),
+            ["no exponential fits", "from 0.702 to 1.38e+06", "one free vibration"],
+        ),
     ],
 )
-def test_bad_histories_are_refused(t, x, says):
-    for call in (peaks, damping):
-        with raises(f"{call.__name__}: ", *says):
-            call(t, x)
-
-
-def test_bad_numbers_are_refused():
-    with raises("about = nan is not finite"):
-        damping([0, 1], [0, 1], about=np.nan)
-    with raises("prominence = -1 must be at least 0"):
-        damping([0, 1], [0, 1], prominence=-1)
-
-
-@pytest.mark.parametrize(("seconds", "found"), [(1.5, 2), (0.1, 0)])
-def test_too_few_peaks_are_refused(seconds, found):
-    t = np.arange(0, seconds, 0.01)
-    with raises(f"peaks found: {found}, needed: 3", "longer history", "prominence = 0.05"):
-        damping(t, viscous(t, 0.1))
-
-
-def test_nothing_at_all():
-    for n in (0, 1, 2, 50):
-        with raises("peaks found: 0"):
-            damping(np.arange(n), np.zeros(n))
-
-
-def test_amplitudes_that_have_no_logarithm():
-    for amplitude in (0.0, -2.0):
-        with raises(f"amplitudes[1] = {amplitude:g} must be positive", "from the equilibrium"):
-            logarithmic_decrement([1.0, amplitude])
-    t = np.linspace(0, 10, 1001)
-    with raises("amplitudes[4] = -0.", "must be positive", "about"):
-        damping(t, viscous(t, 0.1), about=0.7)  # exp(-0.1 · 3.16) = 0.73, next 0.66
+def test_histories_without_a_decrement_are_refused(call, words):
+    with raises(*words):
+        call()
 
 
 def test_a_moved_equilibrium_is_told():
     """A decay about a residual displacement of half of the first amplitude."""
-    t = np.linspace(0, 10, 1001)
-    x = viscous(t, 0.1) + 0.5
+    x = viscous(T, 0.1) + 0.5
     with pytest.warns(ub.ModelWarning, match=r"is about 0\.5,.*give about=0\.5"):
-        wrong = damping(t, x)
+        wrong = damping(T, x)
     assert wrong.decrement < 0.08
-    found = damping(t, x, about=0.5)  # without a warning
+    found = damping(T, x, about=0.5)  # no warning is issued
     assert found.decrement == pytest.approx(0.1, rel=1e-3)
-
-
-def test_bad_amplitudes_are_refused():
-    with raises("amplitudes given: 1, needed: 2"):
-        logarithmic_decrement([1.0])
-    with raises("amplitudes given: 2, needed: 3"):
-        fit_decay([0, 1], [2, 1])
-    with raises("3 t and 4 amplitudes"):
-        fit_decay([0, 1, 2], [4, 3, 2, 1])
-    with raises("amplitudes[0] = nan is not finite"):
-        logarithmic_decrement([np.nan, 1])
-    with raises("no exponential fits", "from 0.702 to 1.38e+06", "one free vibration"):
-        fit_decay([0, 1, 2], [440, 0.702, 1.38e6])
