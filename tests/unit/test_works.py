@@ -100,27 +100,6 @@ def test_a_quadratic_potential_in_statics(scheme):
     assert solution.energy["soil"][-1] == pytest.approx(state, rel=1e-6)
 
 
-def test_dissipation_of_the_scheme_is_that_of_a_spring():
-    """EnergyMomentum(alpha) loses alpha k (Δu)² in a step: as the same potential by springs."""
-    stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=1.0, rhoI=1.0)
-
-    beam = ub.Beam((0, 0), (1, 0), stiff, cells=1)
-
-    def dropped(**parts):
-        up = ub.Velocity((beam,), linear=(0.0, 1.0))
-        scene = ub.Scene([beam], initial=[up], **parts)
-        return run(scene, ub.EnergyMomentum(alpha=0.2), t=(0, 0.5), dt=0.05).energy
-
-    springs = [
-        ub.Slide(ub.ground(*end.point), end, ub.Spring(25.0), axis=(0, 1))
-        for end in (beam.start, beam.end)
-    ]
-    on_soil = dropped(works=[ub.Potential("soil", lambda q: 25.0 * q[1] ** 2)])
-    lost = dropped(connectors=springs)["numerical"]
-    assert lost[-1] > 0.1
-    np.testing.assert_allclose(on_soil["numerical"], lost, rtol=1e-8)
-
-
 # -- against the package's own loads -----------------------------------------------------------
 
 
@@ -187,7 +166,7 @@ def test_buckling_by_a_field():
         # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
         field = ub.Potential("field", lambda q, b: b * ufl.cos(q[2]), numbers={"b": b})
         scene = clamped(beam, loads=[push], works=[field])
-        [factor] = ub.buckling(scene, 1, mesh=ub.Mesh(degree=3)).factors
+        [factor] = ub.buckling(scene, 1, mesh=ub.Mesh(degree=2, refine=10)).factors
         assert factor == pytest.approx((math.pi / 2) ** 2 - b, rel=1e-6)
     work = ub.VirtualWork("air", lambda v, w: v[1] * w[1])
     with raises("the VirtualWork has a stiffness of its own"):
