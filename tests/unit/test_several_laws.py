@@ -120,30 +120,6 @@ def test_cells_that_give_way_are_named():
         run(clamped(member, loads=[pull]))
 
 
-# -- resultants ------------------------------------------------------------------------------------
-
-
-def test_resultants_of_two_classes():
-    """N of a bar under tension and M of a beam in bending, from one section with both laws."""
-    axial, bending = ub.ElastoPlastic(20.0, isotropic=500.0), st.RambergOsgood(5.0, 0.05, 4.0)
-    plain = {"EA": 1e4, "GA": 4e3, "EI": 100.0}
-    both = ub.Section(**plain, axial=axial, bending=bending, hinge=ub.Softening(7.0, 2.0))
-    stretch, turns = np.linspace(0, 0.01, 11), np.linspace(0, 0.5, 11)
-    for section, u, psi in (
-        (ub.Section(**plain, axial=axial), stretch, 0 * turns),
-        (ub.Section(**plain, bending=bending, hinge=ub.Softening(7.0, 2.0)), 0 * stretch, turns),
-    ):
-        states = []
-        for own in (section, both):
-            member = ub.Beam((0, 0), (1, 0), own, cells=1)
-            motion = {"u": ub.Table(range(11), u)} if u.any() else {}
-            end = ub.PrescribedDisplacement(member.end, psi=ub.Table(range(11), psi), **motion)
-            solution = run(clamped(member, end), t=(0, 10), dt=1.0)
-            states.append(solution.material_at(member.at(0.5)))
-        for x, y in zip(*states, strict=True):
-            assert np.abs(y - x).max() <= 1e-8 * max(np.abs(x).max(), 1e-6)
-
-
 # -- cores and bars --------------------------------------------------------------------------------
 
 COVER, CORE, STEEL = (ub.Fibres(ub.ElastoPlastic(x), number=8) for x in (3e7, 4e7, 5e8))

