@@ -164,21 +164,6 @@ def test_joined_places_move_alike():
 # -- balances ------------------------------------------------------------------------------------
 
 
-def test_momentum_of_known_motions():
-    # 6 kg in free flight: p = m v, L = J ω + x × p with the consistent mass of linear cells
-    beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=3.0, rhoI=0.5), cells=3)
-    throw = ub.Velocity([beam], linear=(2, 3), angular=0.5, about=(1, 0))
-    scene = ub.Scene([beam], masses=[ub.PointMass(beam.end, 4.0, 0.25)], initial=[throw])
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)
-    p_x, p_y, L = solution.momentum()[0]
-    v_end = (2.0, 3.0 + 0.5)
-    assert p_x == pytest.approx(6 * 2 + 4 * v_end[0], rel=1e-14)
-    assert p_y == pytest.approx(6 * 3 + 4 * v_end[1], rel=1e-14)
-    # Beam: rhoI L ω + rhoA L^3 / 12 ω about its middle (the mass matrix is exact), + m x v
-    spin = 0.5 * (0.5 * 2 + 3 * 8 / 12) + 6 * 1 * 3
-    assert pytest.approx(spin + 4 * 2 * v_end[1] + 0.25 * 0.5, rel=1e-14) == L
-
-
 def test_a_solution_can_be_read():
     scene, _ = cantilever()
     text = str(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.5))

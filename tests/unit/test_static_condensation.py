@@ -137,36 +137,3 @@ def test_a_singular_block_is_said(block, held):
     rows = A.rows()
     A.data[np.isin(rows, block) & np.isin(A.indices, block)] = 0.0
     assert not Elimination(subdomain, A).factor(np.zeros(A.size))
-
-
-def tower():
-    """A lattice of some cells, with a revolute joint and a support within a beam."""
-    ends, beams = {}, []
-    for a, b in [
-        *(((i, j), (i, j + 1)) for i in range(3) for j in range(3)),
-        *(((i, j), (i + 1, j)) for i in range(2) for j in range(1, 4)),
-    ]:
-        beams.append(ub.Beam(a, b, SECTION, cells=4, name=f"{a}-{b}"))
-        ends.setdefault(a, []).append(beams[-1].start)
-        ends.setdefault(b, []).append(beams[-1].end)
-    joints = [
-        (ub.Revolute if at == (1, 2) else ub.Rigid)(*places)
-        for at, places in ends.items()
-        if len(places) > 1
-    ]
-    feet = [ub.Clamped(ends[i, 0][0]) for i in range(3)]
-    push = ub.PointLoad(ends[0, 3][0], force=(5.0, 1.0))
-    roller = ub.Roller(beams[9].at(0.5), along=(1, 1))
-    return ub.Scene(beams, joints=joints, supports=[*feet, roller], loads=[push])
-
-
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=["statics", "dynamics"])
-def test_on_several_processes_as_on_one(scheme):
-    """Under mpirun the same scene, shared, and by each process alone."""
-    alone, together = (
-        ub.simulate(tower(), scheme, t=(0, 1), dt=0.25, comm=comm)
-        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
-    )
-    assert alone.substeps == together.substeps == 4
-    # Residuals of 1e-10 of the forces, some 1e2 N, on stiffnesses of some 10 N/m.
-    assert np.abs(alone.q - together.q).max() < 1e-8

@@ -345,27 +345,6 @@ def test_wrong_quantities_are_refused(quantities, says):
 # -- scenes ------------------------------------------------------------------------------------
 
 
-def test_statics_needs_cells_alone():
-    section = ub.Section(EA=1e8, GA=1e8, EI=100.0)
-    scene = scenes.cantilever(section, cells=2, force=(0.0, -300.0))
-    tip = scene.beams[0].end
-
-    def end(solution):
-        return solution.position(tip)[-1]
-
-    found = ub.tradeoff(
-        scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
-    )
-    assert found.best.setting.dt == 0.5
-    options = {"scheme": ub.Static(), "t": (0, 1), "dt": 0.5, "mesh": ub.Mesh(refine=100)}
-    again, fine = (
-        ub.simulate(scene, **of, comm=MPI.COMM_SELF) for of in (found.recommended, options)
-    )
-    # Of second order in the cells: those of the reference leave 1e-6.
-    assert np.abs(end(again) - end(fine)).max() < 1e-3
-    assert np.abs(found.limit["tip"] - end(fine)).max() < found.uncertainty["tip"] + 1e-5
-
-
 def test_cells_and_steps_of_a_vibration_are_chosen():
     """A cantilever that is let go: cells and steps; its history as an array of one shape."""
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3)

@@ -126,9 +126,11 @@ def test_the_ledger_closes_in_both_paths(name, alpha, as_by_reference):
 
 
 @pytest.mark.parametrize("name", ["bending, hinge", "fibres", "spring"])
-def test_a_run_goes_on(name, tmp_path):
+def test_a_run_goes_on(name, shared_path):
     """By ``start`` and from a checkpoint: internal variables of any name are taken over."""
-    require_restart(partial(run, dt=5e-3), SCENES[name](), (), ub.EnergyMomentum(), tmp_path, 0.1)
+    require_restart(
+        partial(run, dt=5e-3), SCENES[name](), (), ub.EnergyMomentum(), shared_path, 0.1
+    )
 
 
 def test_modes_are_those_of_elastic_unloading():

@@ -6,8 +6,6 @@ import re
 from functools import partial
 from pathlib import Path
 
-from mpi4py import MPI
-
 import numpy as np
 import pytest
 import ufl
@@ -83,23 +81,6 @@ def test_the_ledger_of_schemes_at_the_end_is_of_second_order():
     assert np.log2(worst[1] / worst[2]) == pytest.approx(2, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic()]
-)
-def test_a_quadratic_potential_in_statics(scheme):
-    """A stiff beam on springs sinks by F/(k L); the trapezoidal rule of its work is exact."""
-    stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9)
-    beam = ub.Beam((0, 0), (2, 0), stiff, cells=4)
-    load = ub.PointLoad(beam.at(0.5), force=(0, -3e-3), amplitude=lambda t: t)
-    ground = ub.Potential("soil", soil, numbers={"k": 50.0})
-    solution = run(ub.Scene([beam], loads=[load], works=[ground]), scheme, t=(0, 1), dt=0.25)
-    # 50 N/m² twice, on 2 m.  Bending is k L⁴/EI = 2e-6 of it, less in its effect.
-    assert solution.displacement(beam.end)[-1, 1] == pytest.approx(-3e-3 / 200, rel=1e-6)
-    assert solution.energy.worst < 1e-9
-    state = 200 * (3e-3 / 200) ** 2 / 2
-    assert solution.energy["soil"][-1] == pytest.approx(state, rel=1e-6)
-
-
 # -- against the package's own loads -----------------------------------------------------------
 
 
@@ -161,7 +142,6 @@ def test_buckling_by_a_field():
     """
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e9, GA=1e9, EI=1.0), cells=4)
     push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
-
     for b in (0.0, 1.0, 2.0):
         # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
         field = ub.Potential("field", lambda q, b: b * ufl.cos(q[2]), numbers={"b": b})
@@ -185,15 +165,6 @@ def test_a_number_may_have_any_name():
 
 
 # -- processes, checkpoints, files -------------------------------------------------------------
-
-
-def test_any_number_of_processes():
-    """Beams of which some processes have no cell."""
-    scene = flying(cells=6)
-    together, alone = (run(scene, comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
-    assert np.abs(together.q - alone.q).max() < 1e-9
-    for name in ("soil", "magnet", "air"):
-        np.testing.assert_allclose(together.energy[name], alone.energy[name], atol=1e-8)
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1, 0.1), ub.Newmark()], ids=repr)
