@@ -141,8 +141,11 @@ def test_functions_without_a_vector_version_are_computed_cell_by_cell(expression
     assert np.allclose(one_by_one(function, x), meant(x), rtol=1e-14)
 
 
-def test_without_the_text_of_the_kernel(tmp_path):
-    """The cache may have lost it."""
+def test_texts_of_kernels(tmp_path):
+    """Inputs after the unknowns are read where they are stored; the cache may have lost a text."""
+    assert simd_kernels.with_stored_inputs("w[0] * w[7]", unknowns=6) == "w[0] * c[1]"
+    with pytest.raises(jit.Refused, match="inputs are not read one by one"):
+        simd_kernels.with_stored_inputs("w[0] * w[i]", unknowns=6)
     with pytest.raises(jit.Refused, match=r"gone\.c has no kernel"):
         simd_kernels.written(tmp_path / "gone.c")
 
@@ -181,8 +184,8 @@ def test_functions_of_elements_are_compiled_together(fresh, capfd):
         out = np.full_like(values, np.nan)
         function.several(1, doubles(inputs), doubles(out))
         assert np.allclose(out, values, rtol=1e-14)  # products, and sines to two last digits
-    known = ufl.lt(ufl.as_ufl(1.0), 2.0)
-    assert pointwise(lambda x: ufl.conditional(known, x, -1.0))[0].several
+    for holds in (lambda x: ufl.lt(ufl.as_ufl(1.0), 2.0), EXPRESSIONS["nested"]):
+        assert pointwise(lambda x, holds=holds: ufl.conditional(holds(x), x, -1.0))[0].several
     assert "error" not in capfd.readouterr().err
 
 
