@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers import assert_balanced, raises, run
+from helpers import assert_balanced, run
 from scenes import clamped
 
 import ufl_beam as ub
@@ -36,8 +36,8 @@ def settled(*supports, beam):
     return [found.reaction(s)[-1] for s in scene.supports], found.energy.supplied["supports"][-1]
 
 
-@pytest.mark.parametrize(("motion", "k"), [("v", (12, 6)), ("psi", (6, 4))])
-def test_a_clamp_settles(motion, k):
+@pytest.mark.parametrize("motion", ["v", "psi"])
+def test_a_clamp_settles(motion):
     """[closed] A beam clamped at both ends; with shear, Φ = 12 EI/(GA L²)."""
     beam, Φ = ub.Beam((0, 0), (L, 0), SECTION, cells=2), 12 * EI / (GA * L**2)
     held = {"v": 0, "psi": 0} | {motion: -SMALL}
@@ -45,14 +45,9 @@ def test_a_clamp_settles(motion, k):
         lambda b: ub.Clamped(b.start), lambda b: moving(b.end, **held), beam=beam
     )
     # The end moves by v: V = 12 EI/L³ v, M = -6 EI/L² v; it turns: V = -6 EI/L² ψ, M = 4 EI/L ψ
-    if motion == "v":
-        expected = [-12 * EI / L**3 * SMALL / (1 + Φ), 6 * EI / L**2 * SMALL / (1 + Φ)]
-        force = end[1]
-    else:
-        expected = [6 * EI / L**2 * SMALL / (1 + Φ), -(4 + Φ) * EI / L * SMALL / (1 + Φ)]
-        force = end[2]
-    assert end[1:] == pytest.approx(expected, rel=1e-5)
-    assert work == pytest.approx(-force * SMALL / 2, rel=1e-5)
+    shear, moment = (-12 / L**3, 6 / L**2) if motion == "v" else (6 / L**2, -(4 + Φ) / L)
+    assert end[1:] == pytest.approx(np.array([shear, moment]) * EI * SMALL / (1 + Φ), rel=1e-5)
+    assert work == pytest.approx(-end[1 if motion == "v" else 2] * SMALL / 2, rel=1e-5)
 
 
 def test_the_middle_of_a_continuous_beam_settles():
@@ -93,18 +88,13 @@ def test_an_inclined_roller_settles():
 def test_a_support_at_an_angle_moves_far(scheme):
     """As the same model in turned axes."""
 
-    def swung(angle):
-        c, s = math.cos(angle), math.sin(angle)
-        soft = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=3.0, rhoI=0.1)
-        beam = ub.Beam((0, 0), (2 * c, 2 * s), soft, cells=4)
-        held = ub.PrescribedDisplacement(
-            beam.end, u=lambda t: -0.2 * t**2, v=lambda t: 0.4 * t**2, along=(c, s)
-        )
-        return clamped(beam, held), beam
-
+    soft = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=3.0, rhoI=0.1)
+    motion = {"u": lambda t: -0.2 * t**2, "v": lambda t: 0.4 * t**2}
     runs = []
     for angle in (0.0, 0.7):
-        scene, beam = swung(angle)
+        c, s = math.cos(angle), math.sin(angle)
+        beam = ub.Beam((0, 0), (2 * c, 2 * s), soft, cells=4)
+        scene = clamped(beam, ub.PrescribedDisplacement(beam.end, **motion, along=(c, s)))
         moved = run(scene, scheme, newton=ub.Newton(rtol=1e-12), dt=0.05)
         runs.append((moved.section_forces_at(beam.start), moved.energy.supplied["supports"]))
         if isinstance(scheme, ub.EnergyMomentum | ub.EnergyMomentumStatic):
@@ -112,9 +102,3 @@ def test_a_support_at_an_angle_moves_far(scheme):
     (other_force, other_work), (force, work) = runs
     assert force == pytest.approx(other_force, abs=1e-7 * np.abs(force).max())
     assert work == pytest.approx(other_work, abs=1e-7 * np.abs(work).max())
-
-
-def test_a_direction_must_not_be_zero():
-    beam = ub.Beam((0, 0), (2, 0), SECTION)
-    with raises("PrescribedDisplacement at beam.end", "along = (0, 0)", kind=ub.ModelError):
-        ub.PrescribedDisplacement(beam.end, v=0.1, along=(0, 0))

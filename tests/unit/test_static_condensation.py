@@ -11,7 +11,6 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.solvers.beam_elimination import Elimination
 
@@ -45,7 +44,7 @@ def system(cell_dofs, seed=0, more=(), held=()):
 
 
 def solve(elimination, b, again=False):
-    """The solution, by elimination and a dense solution of what is left."""
+    """The solution, by elimination and a dense solution of the unknowns that are left."""
     if again:
         elimination.reduce(b)
     else:
@@ -55,6 +54,20 @@ def solve(elimination, b, again=False):
     x = np.empty(len(b))
     elimination.expand(np.linalg.solve(left, elimination.f), x)
     return x
+
+
+def compare(subdomain, A, dense, left, seed=0):
+    """Solutions for two right-hand sides with those of the whole; ``left`` unknowns are left.
+
+    Random blocks need pivots between them, too, which elimination does not look for: some digits of
+    sixteen are lost, here four at most.
+    """
+    elimination = Elimination(subdomain, A)
+    assert elimination.left.size == left
+    for again, b in enumerate(np.random.default_rng(seed).uniform(-1, 1, (2, subdomain.size))):
+        x = solve(elimination, b, again)
+        assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
+    return elimination
 
 
 CHAINS = {  # beams as their vertices; how many vertices are left
@@ -79,31 +92,14 @@ CHAINS = {  # beams as their vertices; how many vertices are left
 @pytest.mark.parametrize("seed", [0, 1])
 def test_solutions_are_those_of_the_whole(name, seed):
     cell_dofs, left = CHAINS[name]
-    subdomain, A, dense = system(cell_dofs, seed)
-    elimination = Elimination(subdomain, A)
-    assert elimination.left.size == 3 * left
-    for again, b in enumerate(np.random.default_rng(seed).uniform(-1, 1, (2, subdomain.size))):
-        # Random blocks need pivots between them, too, which elimination does not look for: some
-        # digits of sixteen are lost, here four at most.
-        found = solve(elimination, b, again)
-        assert np.allclose(found, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
-
-
-def test_another_matrix_of_the_same_structure():
-    subdomain, A, dense = system(cells_of(range(10)))
-    elimination, b = Elimination(subdomain, A), np.ones(subdomain.size)
-    solve(elimination, b)
-    A.data *= 2.0
-    assert np.allclose(solve(elimination, b), np.linalg.solve(2 * dense, b), rtol=1e-12, atol=0)
+    compare(*system(cell_dofs, seed), 3 * left, seed)
 
 
 def test_held_degrees_of_freedom():
     """Of an end, of a joint, and some or all of a vertex within a chain."""
     held = [0, 1, 2, 9, 16, 21, 22, 23]
-    subdomain, A, dense = system(cells_of([0, 1, 2, 3], [3, 4, 5, 6, 7, 8, 9]), held=held)
-    elimination, b = Elimination(subdomain, A), np.arange(1.0, subdomain.size + 1)
-    assert elimination.left.size == 3  # both ends have one neighbour
-    assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
+    cell_dofs = cells_of([0, 1, 2, 3], [3, 4, 5, 6, 7, 8, 9])
+    compare(*system(cell_dofs, held=held), 3)  # both ends have one neighbour
 
 
 @pytest.mark.parametrize("scattered", [(0,), (11,), (0, 11), (5,), (5, 6), (0, 5, 11)])
@@ -114,34 +110,24 @@ def test_vertices_whose_degrees_of_freedom_do_not_follow_each_other(scattered):
         number[firsts] = np.roll(firsts, 1)
     else:
         number[firsts[0] + np.arange(3)] = firsts[0] + np.array([1, 2, 0])
-    subdomain, A, dense = system(number[cells_of(range(12))])
-    elimination = Elimination(subdomain, A)
-    assert elimination.left.size == 3 * len(scattered)
-    for again, b in enumerate(np.random.default_rng(1).uniform(-1, 1, (2, subdomain.size))):
-        x = solve(elimination, b, again)
-        assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
+    compare(*system(number[cells_of(range(12))]), 3 * len(scattered), seed=1)
 
 
-@pytest.mark.parametrize("pair", [(12, 60), (12, 30), (13, 17)])
-def test_what_couples_to_more_is_left(pair):
-    """A further unknown, another vertex far away, the next but one."""
-    cell_dofs = cells_of(range(20))
-    subdomain, A, dense = system(cell_dofs, more=[pair])
-    elimination, b = Elimination(subdomain, A), np.ones(subdomain.size)
-    left = {60: 4, 30: 6, 17: 3}[pair[1]]  # vertex and unknown, two vertices, one end as ever
-    assert elimination.left.size == left
-    assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
+@pytest.mark.parametrize(("pair", "left"), [((12, 60), 4), ((12, 30), 6), ((13, 17), 3)])
+def test_unknowns_that_couple_to_others_are_left(pair, left):
+    """To a further unknown, to a vertex far away, to the next but one (one end is left as ever)."""
+    compare(*system(cells_of(range(20)), more=[pair]), left)
 
 
-def test_zero_pivots_within_a_block():
-    """A block that is regular although its first pivots are zero."""
+def test_zero_pivots_and_another_matrix():
+    """A block that is regular although its first pivots are zero; other entries afterwards."""
     subdomain, A, dense = system(cells_of(range(6)))
-    entries = A.positions(np.array([6, 7, 8, 7, 8]), np.array([6, 7, 8, 6, 6]))
-    A.data[entries] = 0, 0, 0, 3, 0
-    dense[[6, 7, 8, 7, 8], [6, 7, 8, 6, 6]] = 0, 0, 0, 3, 0
-    b = np.ones(subdomain.size)
-    x = solve(Elimination(subdomain, A), b)
-    assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
+    rows, columns, values = [6, 7, 8, 7, 8], [6, 7, 8, 6, 6], [0, 0, 0, 3, 0]
+    A.data[A.positions(np.array(rows), np.array(columns))] = values
+    dense[rows, columns] = values
+    elimination, b = compare(subdomain, A, dense, 3), np.ones(subdomain.size)
+    A.data *= 2.0
+    assert np.allclose(solve(elimination, b), np.linalg.solve(2 * dense, b), rtol=1e-9, atol=1e-10)
 
 
 @pytest.mark.parametrize(("block", "held"), [((0, 1, 2), ()), ((3, 4, 5), (3, 4, 5))])
@@ -151,45 +137,3 @@ def test_a_singular_block_is_said(block, held):
     rows = A.rows()
     A.data[np.isin(rows, block) & np.isin(A.indices, block)] = 0.0
     assert not Elimination(subdomain, A).factor(np.zeros(A.size))
-
-
-def tower():
-    """A lattice of some cells, with a revolute joint and a support within a beam."""
-    ends, beams = {}, []
-    for a, b in [
-        *(((i, j), (i, j + 1)) for i in range(3) for j in range(3)),
-        *(((i, j), (i + 1, j)) for i in range(2) for j in range(1, 4)),
-    ]:
-        beams.append(ub.Beam(a, b, SECTION, cells=4, name=f"{a}-{b}"))
-        ends.setdefault(a, []).append(beams[-1].start)
-        ends.setdefault(b, []).append(beams[-1].end)
-    joints = [
-        (ub.Revolute if at == (1, 2) else ub.Rigid)(*places)
-        for at, places in ends.items()
-        if len(places) > 1
-    ]
-    feet = [ub.Clamped(ends[i, 0][0]) for i in range(3)]
-    push = ub.PointLoad(ends[0, 3][0], force=(5.0, 1.0))
-    roller = ub.Roller(beams[9].at(0.5), along=(1, 1))
-    return ub.Scene(beams, joints=joints, supports=[*feet, roller], loads=[push])
-
-
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=["statics", "dynamics"])
-def test_on_several_processes_as_on_one(scheme):
-    """Under mpirun the same scene, shared, and by each process alone."""
-    alone, together = (
-        ub.simulate(tower(), scheme, t=(0, 1), dt=0.1, comm=comm)
-        for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
-    )
-    assert alone.substeps == together.substeps == 10
-    # Residuals of 1e-10 of the forces, some 1e2 N, on stiffnesses of some 10 N/m.
-    assert np.abs(alone.q - together.q).max() < 1e-8
-
-
-def test_a_singular_tangent_cuts_the_step():
-    """Also where elimination finds it; the message is that of any failure."""
-    simulation = ub.Simulation(tower(), ub.EnergyMomentum())
-    c = simulation.equation.c
-    c.cells, c.product, c.stiffnesses = ffi.NULL, ffi.NULL, 0  # nothing adds to the tangent
-    with pytest.raises(ub.ConvergenceError, match="found a singular tangent"):
-        simulation.step_to(0.1)

@@ -2,12 +2,11 @@
 """Static runs: loads that are there from the start, relaxation, first reactions, broken springs."""
 
 import itertools
-import re
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import run
+from helpers import raises, run
 from scenes import clamped
 
 import ufl_beam as ub
@@ -36,8 +35,7 @@ STEADY = {
 
 
 @pytest.mark.parametrize("load", STEADY.values(), ids=STEADY)
-@pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
-def test_under_steady_loads_both_static_schemes_agree(load, theta):
+def test_under_steady_loads_both_static_schemes_agree(load):
     """`EnergyMomentumStatic` arrives where `Static` does, in the first step, with an exact ledger.
 
     The loads are applied in parts that turn no node by more than 0.02 rad: forces are in error by
@@ -45,46 +43,40 @@ def test_under_steady_loads_both_static_schemes_agree(load, theta):
     which the rest of the step leaves a hundredth, and later steps nothing.
     """
     beam, scene = cantilever(load)
-    expected = run(scene, ub.Static()).displacement(beam.end)[-1]
-    found = run(scene, ub.EnergyMomentumStatic(theta))
-    ends = found.displacement(beam.end)
-    assert (ends[0] == 0).all()
-    assert ends[1] == pytest.approx(expected, rel=2e-3, abs=2e-3)
-    assert ends[-1] == pytest.approx(expected, rel=1e-3, abs=1e-3)
-    assert found.energy.worst < 1e-9
-    # All of the work of the load is counted: at θ = 1/2 it is what is stored.
-    assert found.energy["loads"][1] > 0
-    if theta == 0.5:
-        assert found.energy["stored"] == pytest.approx(found.energy["loads"], rel=1e-9)
+    expected = run(scene, ub.Static(), dt=0.5).displacement(beam.end)[-1]
+    for theta in (0.5, 0.75, 1.0):
+        found = run(scene, ub.EnergyMomentumStatic(theta))
+        ends = found.displacement(beam.end)
+        assert (ends[0] == 0).all()
+        assert ends[1] == pytest.approx(expected, rel=2e-3, abs=2e-3)
+        assert ends[-1] == pytest.approx(expected, rel=1e-3, abs=1e-3)
+        assert found.energy.worst < 1e-9
+        # All of the work of the load is counted: at θ = 1/2 it is what is stored.
+        assert found.energy["loads"][1] > 0
+        if theta == 0.5:
+            assert found.energy["stored"] == pytest.approx(found.energy["loads"], rel=1e-9)
 
 
 @pytest.mark.parametrize("reference", [False, True])
 def test_the_step_after_loads_were_applied_does_not_go_on_like_that(reference):
     """A large load is applied in many equal parts; the step after them is not cut."""
     _, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, 100.0)), EA=1e4, GA=4e3, EI=100.0)
-    found = run(scene, ub.EnergyMomentumStatic(), dt=0.5, newton=ub.Newton(reference=reference))
-    assert found.substeps == 32 + 2
+    newton = ub.Newton(reference=reference)
+    assert run(scene, ub.EnergyMomentumStatic(), dt=0.5, newton=newton).substeps == 32 + 2
 
 
-def test_a_steady_motion_and_a_steady_actuator():
+@pytest.mark.parametrize("by", ["support", "actuator"])
+def test_a_steady_motion_and_a_steady_actuator(by):
     """A support and a force that are there from the start are applied in parts as well."""
     lifted = [lambda b: ub.PrescribedDisplacement(b.end, v=0.6)]
-    beam, scene = cantilever(supports=lifted)
-    ends = [
-        run(scene, scheme).displacement(beam.end)[-1]
-        for scheme in (ub.Static(), ub.EnergyMomentumStatic())
-    ]
-    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
-
-    beam, scene = cantilever()
-    jack = ub.Stretch(ub.ground(1, -2), beam.end, ub.PrescribedForce(lambda t: 2.0))
-    scene = ub.Scene([beam], supports=scene.supports, connectors=[jack])
-    ends = [
-        run(scene, scheme).displacement(beam.end)[-1]
-        for scheme in (ub.Static(), ub.EnergyMomentumStatic())
-    ]
-    assert np.abs(ends[0][1]) > 0.1
-    assert ends[1] == pytest.approx(ends[0], rel=1e-6)
+    beam, scene = cantilever(supports=lifted if by == "support" else ())
+    if by == "actuator":
+        jack = ub.Stretch(ub.ground(1, -2), beam.end, ub.PrescribedForce(lambda t: 2.0))
+        scene = replace(scene, connectors=[jack])
+    schemes = ub.Static(), ub.EnergyMomentumStatic()
+    one, other = (run(scene, scheme).displacement(beam.end)[-1] for scheme in schemes)
+    assert np.abs(one[1]) > 0.1
+    assert other == pytest.approx(one, rel=1e-6)
 
 
 def test_loads_that_grow_are_not_applied_before():
@@ -99,15 +91,16 @@ def test_loads_that_grow_are_not_applied_before():
 # -- relaxation ------------------------------------------------------------------------------------
 
 
+def relaxing(**law):
+    """A beam with Duvaut-Lions plasticity, bent within one second and then held."""
+    law = ub.ElastoPlastic(yield_limit=5.0, viscosity=ub.DuvautLions(0.5), **law)
+    bend = [lambda b: ub.PrescribedDisplacement(b.end, v=lambda t: 0.1 * min(t, 1.0))]
+    return cantilever(supports=bend, EI=100.0, bending=law)[1]
+
+
 def test_relaxation_is_not_cut():
-    """A beam that was bent in one second relaxes for five, with steps up to the relaxation time:
-    one step each, by either scheme; what it bears is of first order in the step."""
-    law = ub.ElastoPlastic(yield_limit=5.0, isotropic=10.0, viscosity=ub.DuvautLions(0.5))
-    _, scene = cantilever(
-        supports=[lambda b: ub.PrescribedDisplacement(b.end, v=lambda t: 0.1 * min(t, 1.0))],
-        EI=100.0,
-        bending=law,
-    )
+    """Steps up to the relaxation time are one step each, by either scheme, of first order."""
+    scene = relaxing(isotropic=10.0)
     bent = run(scene, ub.Static())
 
     def relaxed(scheme, dt):
@@ -119,6 +112,19 @@ def test_relaxation_is_not_cut():
         coarse, middle, fine = (relaxed(scheme, dt) for dt in (0.5, 0.25, 0.125))
         assert coarse == pytest.approx(fine, rel=0.02)
         assert 1.5 < (coarse - middle) / (middle - fine) < 2.5
+
+
+def test_the_order_of_the_work_of_inelastic_laws():
+    """Of first order with θ = 1, of second with θ = 1/2."""
+
+    def work(scheme, steps):
+        return run(relaxing(), scheme, t=(0, 2), dt=1 / steps).energy["supports"][-1]
+
+    exact = work(ub.EnergyMomentumStatic(0.5), 512)
+    for theta, least, most in ((1.0, 0.8, 1.2), (0.5, 1.5, 4.0)):
+        scheme = ub.EnergyMomentumStatic(theta)
+        errors = [abs(work(scheme, steps) - exact) for steps in (16, 32)]
+        assert least < np.log2(errors[0] / errors[1]) < most
 
 
 # -- the first reaction ----------------------------------------------------------------------------
@@ -144,78 +150,12 @@ def test_the_first_reaction(scheme):
     assert again.reaction(clamp)[0, 1:] == pytest.approx(again.reaction(clamp)[-1, 1:], rel=1e-3)
 
 
-# -- what has broken -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic()], ids=str
-)
-@pytest.mark.parametrize("dt", [0.1, 0.01])
-def test_a_broken_spring_stores_nothing(scheme, dt):
-    """It has dissipated its fracture energy, and the ledger is closed."""
-    limit, energy = 100.0, 50.0
-    body = ub.Body((1, 0), mass=1.0, inertia=1.0)
-    spring = ub.Spring(1e4, softening=ub.LinearSoftening(limit, energy))
-    stretch = ub.Stretch(ub.ground(0, 0), body.middle, spring)
-    pulled = ub.PrescribedDisplacement(body.middle, u=lambda t: 2.0 * t, v=0, psi=0)
-    scene = ub.Scene([], bodies=[body], supports=[pulled], connectors=[stretch])
-    found = run(scene, scheme, dt=dt)
-    assert found.energy["stored"][-1] == 0.0
-    # The law and the unknown force err by a digit of the motion, which was 2 m
-    assert abs(found.connector(stretch).force[-1]) <= 1e4 * np.spacing(2.0)
-    assert found.energy["hinges"][-1] == pytest.approx(energy, rel=1e-9)
-    if not isinstance(scheme, ub.Static):
-        assert found.energy.worst < 1e-9
-
-
-# -- orders ----------------------------------------------------------------------------------------
-
-
-def documented_orders():
-    """Orders of the work of a viscous law by scheme, from the table in docs/schemes.md."""
-    lines = (Path(__file__).parents[2] / "docs" / "schemes.md").read_text().splitlines()
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
-    name = "viscous yielding: work"
-    columns = {row.index(name) for row in rows if name in row}
-    return {
-        row[0].strip("`"): row[column].partition(" (")[0]
-        for column in columns
-        for row in rows
-        if len(row) == 5 and row[0].startswith("`EnergyMomentumStatic")
-    }
-
-
-def test_the_order_of_the_work_of_inelastic_laws():
-    """Of first order with θ = 1, of second with θ = 1/2, and docs/schemes.md says so."""
-    documented = documented_orders()
-    assert documented == {"EnergyMomentumStatic()": "1", "EnergyMomentumStatic(0.5)": "2 to 3"}
-
-    def work(scheme, steps):
-        law = ub.ElastoPlastic(yield_limit=5.0, viscosity=ub.DuvautLions(0.5))
-        _, scene = cantilever(
-            supports=[lambda b: ub.PrescribedDisplacement(b.end, v=lambda t: 0.1 * min(t, 1.0))],
-            EI=100.0,
-            bending=law,
-        )
-        return run(scene, scheme, t=(0, 2), dt=1 / steps).energy["supports"][-1]
-
-    exact = work(ub.EnergyMomentumStatic(0.5), 512)
-    for scheme, least, most in (
-        (ub.EnergyMomentumStatic(), 0.8, 1.2),
-        (ub.EnergyMomentumStatic(0.5), 1.5, 4.0),
-    ):
-        errors = [abs(work(scheme, steps) - exact) for steps in (16, 32)]
-        assert least < np.log2(errors[0] / errors[1]) < most
-
-
 def test_reactions_where_a_run_ends():
     """Those of the last state that was accepted, not of the step that failed."""
-    softening = ub.Softening(
-        limit=2.0, fracture_energy=0.05
-    )  # above the snap-back of an imposed force
-    _, scene = cantilever(
-        lambda b: ub.PointLoad(b.end, force=(0, -4.0), amplitude=ub.ramp(1.0)), hinge=softening
-    )
+    # Above the snap-back of an imposed force
+    softening = ub.Softening(limit=2.0, fracture_energy=0.05)
+    load = {"force": (0, -4.0), "amplitude": ub.ramp(1.0)}
+    _, scene = cantilever(lambda b: ub.PointLoad(b.end, **load), hinge=softening)
     with pytest.raises(ub.ConvergenceError) as ended:
         run(scene, ub.Static(), dt=0.3)
     solution = ended.value.solution
@@ -226,42 +166,33 @@ def test_reactions_where_a_run_ends():
     assert force[:2] == pytest.approx([0.0, 4.0 * t], abs=1e-8)
 
 
-def test_who_asks_for_a_velocity_is_told():
-    """A controller, before anything is computed; a loop of one's own."""
+def test_a_controller_that_asks_for_a_velocity_is_refused():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=2)
     brake = ub.Controller(lambda now: -0.1 * now.velocity(beam.end)[1])
-    slide = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
-    scene = clamped(beam, connectors=[slide])
-    with pytest.raises(ub.ArgumentError, match=r"velocity of beam.end .*the run is static"):
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
-    simulation = ub.Simulation(ub.Scene([beam], supports=scene.supports), ub.EnergyMomentumStatic())
-    with pytest.raises(ub.ArgumentError, match="there is none"):
-        simulation.velocity(beam.end)
-    simulation.close()
+    scene = clamped(beam, connectors=[ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))])
+    with raises("velocity of beam.end", "the run is static"):
+        run(scene, ub.Static())
 
 
 # -- leaps to other branches -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("dt", "reference"), [(1.0, False), (0.25, False), (0.01, False), (0.01, True)]
-)
-def test_a_straight_rope_sags_under_its_weight(dt, reference):
+@pytest.mark.parametrize("dt", [1.0, 0.25, 0.01])
+def test_a_straight_rope_sags_under_its_weight(dt):
     """[closed] H of the parabola, from w² S³/(24 H²) = H S/EA: 27 515 N for EI = 0.
 
     Its force is the third power of its sag, so that works differ by a factor of 2 in the first step
     however short it is.  EI and the sag, 2.3 % of the span, change H by less than half a percent.
     """
-    S, EA, weight, cells = 100.0, 2e7, 50.0, 12 if reference else 60
+    S, EA, weight = 100.0, 2e7, 50.0
     section = ub.Section(EA=EA, GA=1e7, EI=1e3, rhoA=weight / 9.81)
-    rope = ub.Beam((0, 0), (S, 0), section, cells=cells)
+    rope = ub.Beam((0, 0), (S, 0), section, cells=60)
     ends = [ub.Pinned(rope.start), ub.Pinned(rope.end)]
     scene = ub.Scene([rope], supports=ends, loads=[ub.Gravity(amplitude=lambda t: t)])
     end = 3 * dt if dt < 0.1 else 1.0
-    newton = ub.Newton(reference=reference)
-    found = ub.simulate(scene, ub.Static(), t=(0, end), dt=dt, newton=newton)
-    pull = -found.reaction(ends[0])[-1, 0]
+    found = run(scene, ub.Static(), t=(0, end), dt=dt)
     if end == 1.0:
+        pull = -found.reaction(ends[0])[-1, 0]
         assert pull == pytest.approx((EA * (weight * S) ** 2 / 24) ** (1 / 3), rel=5e-3)
     assert found.substeps < 8 + 20 / dt  # a few substeps from the straight state
 
@@ -288,7 +219,7 @@ def test_a_shallow_truss_is_refused_at_its_limit_load(scale):
 
 def test_a_start_in_equilibrium_stays():
     """Loads that joints alone bear move nothing: works are round-off, which no check may judge."""
-    for angle in np.linspace(0, 6.2, 20):
+    for angle in np.linspace(0, 6.2, 7):
         r = np.array([np.cos(angle), np.sin(angle)])
         links = [ub.Body(tuple((i + 0.5) * r), mass=1.0, inertia=1 / 12) for i in range(2)]
         ground = ub.ground(0, 0)
@@ -317,27 +248,8 @@ def rods(*points, loads=None, **more):
     return ub.Scene(beams, joints=joints, supports=supports, loads=acting, **more)
 
 
-def test_a_hanging_body():
-    """[closed] The pin bears the weight."""
-    body = ub.Body((0.3, -0.4), mass=2.0, inertia=1e-3)
-    pin = ub.Revolute(ub.ground(0.3, 0.6), body.at(0.3, 0.6))
-    scene = ub.Scene([], joints=[pin], bodies=[body], loads=[ub.Gravity()])
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
-    np.testing.assert_allclose(run.displacement(body.middle)[-1], 0.0, atol=1e-12)
-    assert np.hypot(*run.joint(pin).force[-1]) == pytest.approx(2 * 9.81, rel=1e-9)
-
-
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
-def test_hanging_rods_stretch_under_their_weight(scheme):
-    """[closed] ∫N/EA: (3/2 + 1/2) m g l/EA, for l = 1; small strains 2e-5."""
-    scene = rods((0, 0), (0, -1), (0, -2))
-    run = ub.simulate(scene, scheme, t=(0, 3), dt=0.5)
-    sunk = run.displacement(scene.beams[-1].end)[-1]
-    np.testing.assert_allclose(sunk, [0, -2 * 9.81 / 1e6, 0], rtol=1e-4, atol=1e-12)
-
-
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()], ids=str)
-@pytest.mark.parametrize("tip", [(8, 10), (8, 12), (6, 4)])
+@pytest.mark.parametrize("tip", [(8, 10), (6, 4)])
 def test_a_weight_hangs_from_a_flexible_arm(scheme, tip):
     """The slack rope resists no swing before the first step; then it follows the tip sideways."""
     steel = ub.Section.tube(0.3, 0.012, E=210e9, nu=0.3, rho=7850.0)
@@ -371,10 +283,8 @@ def test_a_path_of_what_its_weight_holds():
 @pytest.mark.parametrize(
     ("points", "loads", "said"),
     [
-        # nothing acts; it falls; it is not where its weight balances; it is pulled, but flies
-        ([(0, 0), (0, -1)], lambda rod: [], r"can turn about \(.*\)\. Add supports"),
+        ([(0, 0), (0, -1)], lambda rod: [], ". Add supports"),
         ([(0, 0), (1, -1)], None, "only near an equilibrium, as a weight below its hinge"),
-        # the load turns with the rod; steady rotation is the same at any angle
         (
             [(0, 0), (1, 0)],
             lambda rod: [ub.FollowerLoad(rod.end, force=(5, 0))],
@@ -382,27 +292,25 @@ def test_a_path_of_what_its_weight_holds():
         ),
         ([(0, 0), (1, 0)], lambda rod: [ub.RotatingFrame(3.0)], "loads do not hold it either"),
     ],
+    ids=["unloaded", "it falls", "the load turns with it", "it rotates steadily"],
 )
-def test_what_loads_do_not_hold(points, loads, said):
-    """It is refused with names, by statics, paths and buckling."""
-    with pytest.raises(ub.ArgumentError, match=r"free to move in 1 way.*can turn about") as failure:
+def test_motions_that_loads_do_not_hold_are_refused(points, loads, said):
+    """With names, by statics and buckling."""
+    with raises("free to move in 1 way", "can turn about (", said):
         ub.simulate(rods(*points, loads=loads), ub.Static(), t=(0, 1), dt=1)
-    assert re.search(said, str(failure.value))
     with pytest.raises(ub.ArgumentError, match=r"free to move|stiffness of its own"):
         ub.buckling(rods(*points, loads=loads), 1)
 
 
-@pytest.mark.parametrize("others", [0, 1])
-def test_only_motions_that_loads_do_not_hold_are_named(others):
+def test_only_motions_that_loads_do_not_hold_are_named():
     """A body that hangs from a rod at its own centre spins; its weight holds the swing, and that of
     bodies beside it that hang above their centres."""
     arm = ub.Beam((0, 0), (2, 0), ROD, cells=4)
     bodies = [ub.Body((x, -1), mass=1.0, inertia=1.0, name=n) for x, n in ((2, "load"), (1, "bob"))]
     rods = [ub.Link(arm.end, bodies[0].middle), ub.Link(arm.at(0.5), bodies[1].at(1, -0.5))]
     scene = ub.Scene(
-        [arm], bodies=bodies[: 1 + others], joints=rods[: 1 + others],
-        supports=[ub.Clamped(arm.start)], loads=[ub.Gravity()],
-    )  # fmt: skip
+        [arm], joints=rods, supports=[ub.Clamped(arm.start)], loads=[ub.Gravity()], bodies=bodies
+    )
     spin = r"in 1 way[^:]*: load \(body 0\) can turn about \(2, -1\)\. The loads do not hold it"
     with pytest.raises(ub.ArgumentError, match=spin):
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)

@@ -1,29 +1,20 @@
 # SPDX-License-Identifier: MIT
 """Steps of C: openings within a step, states that are kept, interrupts, steps of any size."""
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from helpers import run
+from helpers import raises, run
 from scenes import SECTION, clamped, rigid_chain
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import lib
 
 SCHEMES = [
-    ub.EnergyMomentum(),
-    ub.EnergyMomentum(0.1, 0.05),
-    ub.EnergyMomentumPrinted(),
-    ub.Newmark(0.6, 0.36),
-    ub.GeneralizedAlpha(0.5),
-    ub.EnergyMomentumDecaying(0.6),
-    ub.Static(),
-    ub.EnergyMomentumStatic(),
-    ub.EnergyMomentumStatic(0.5),
-]
+    ub.EnergyMomentum(0.1, 0.05), ub.EnergyMomentumDecaying(0.6), ub.GeneralizedAlpha(0.5),
+    ub.Static(), ub.EnergyMomentumStatic(0.5),
+]  # fmt: skip
 
 pytestmark = pytest.mark.serial
 
@@ -48,16 +39,8 @@ def elastic():
 def inelastic():
     """Bending that hardens, and a hinge in a cell that softens."""
     law = ub.ElastoPlastic(yield_limit=30.0, kinematic=50.0)
-    soft = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, bending=law)
-    weak = ub.Section(
-        EA=1e4,
-        GA=1e4,
-        EI=100.0,
-        rhoA=1.0,
-        rhoI=1.0,
-        hinge=ub.Softening(limit=25.0, fracture_energy=20.0),
-    )
-    left = ub.Beam((0, 0), (0, 3), soft, cells=4)
+    weak = replace(SECTION, hinge=ub.Softening(limit=25.0, fracture_energy=20.0))
+    left = ub.Beam((0, 0), (0, 3), replace(SECTION, bending=law), cells=4)
     roof = ub.Beam((0, 3), (4, 3), weak, cells=4)
     return rigid_chain(
         [left, roof],
@@ -84,50 +67,6 @@ def connected():
         ],
         loads=[ub.PointLoad(left.end, force=(40.0, -10.0), amplitude=ub.ramp(0.4))],
         connectors=props,
-    )
-
-
-def jointed():
-    """A measured joint, springs that yield and soften, and plastic hinges of zero length."""
-    yields, softens = (
-        ub.ElastoPlastic(yield_limit=5.0, kinematic=20.0),
-        ub.Softening(limit=8.0, fracture_energy=20.0),
-    )
-    left = ub.Beam((0, 0), (0, 3), SECTION, cells=4, hinges={0.0: ub.ElastoPlastic(25.0, 9.0)})
-    roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4)
-    right = ub.Beam((4, 3), (4, 0), SECTION, cells=4, hinges={1.0: softens})
-    return ub.Scene(
-        [left, roof, right],
-        joints=[
-            ub.Revolute(left.end, roof.start, multipliers=True),
-            ub.Rigid(roof.end, right.start),
-        ],
-        connectors=[
-            ub.Turn(left.end, roof.start, ub.Spring(100.0, law=yields)),
-            ub.Stretch(left.at(0.25), roof.at(0.25), ub.Spring(200.0)),
-            ub.Stretch(right.at(0.5), roof.at(0.5), ub.Spring(300.0, softening=softens)),
-        ],
-        supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(40.0, -10.0), amplitude=ub.ramp(0.4))],
-    )
-
-
-def driven():
-    """Dampers, a motor and an actuator."""
-    left = ub.Beam((0, 0), (0, 3), SECTION, cells=4)
-    roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4)
-    return ub.Scene(
-        [left, roof],
-        connectors=[
-            ub.Turn(left.end, roof.start, ub.PrescribedMotion(lambda t: 0.3 * np.sin(t))),
-            ub.Turn(ub.ground(0, 0), left.start, ub.Damper(20.0)),
-            ub.Turn(ub.ground(4, 3), roof.end, ub.Damper(5.0)),
-            ub.Stretch(ub.ground(2, 0), roof.at(0.5), ub.PrescribedForce(ub.ramp(0.3))),
-            ub.Stretch(ub.ground(4, 0), left.at(0.5), ub.PrescribedForce(lambda t: -3.0 * t)),
-        ],
-        joints=[ub.Revolute(left.end, roof.start)],
-        supports=[ub.Pinned(left.start), ub.Roller(roof.end)],
-        loads=[ub.PointLoad(left.end, force=(4.0, -1.0), amplitude=ub.ramp(0.4))],
     )
 
 
@@ -164,25 +103,12 @@ def end(simulation, steps, dt=0.02):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_steps_in_which_several_places_open_are_those_of_the_reference(scheme, as_by_reference):
     """Scenes of all kinds are compared in properties/test_reference_path.py."""
-    found = ub.simulate(slipping(), scheme, t=(0, 0.36), dt=0.04, newton=ub.Newton(1e-12))
-    as_by_reference(found, 1e-7)
+    as_by_reference(run(slipping(), scheme, t=(0, 0.36), dt=0.04, newton=ub.Newton(1e-12)), 1e-7)
 
 
-@pytest.mark.parametrize("steps", [1, 2, 3])
-@pytest.mark.parametrize("scheme", SCHEMES[:6], ids=str)
-def test_velocities_before_the_last_step(scheme, steps):
-    """C writes new velocities over the oldest, where nothing asks for those."""
-    simulation = end(ub.Simulation(elastic(), scheme), steps)
-    before = simulation.now.v[0]
-    simulation.step_to((steps + 1) * 0.02)
-    assert np.array_equal(simulation.inertia.v_before, before)
-    assert not np.array_equal(simulation.inertia.v, before)
-
-
-@pytest.mark.parametrize("make", [elastic, connected])
-def test_states_that_were_asked_for_stay(make):
+def test_states_that_were_asked_for_stay():
     """They are copied once they are asked for, and later steps do not write to them."""
-    watched, alone = (ub.Simulation(make(), ub.EnergyMomentum()) for _ in range(2))
+    watched, alone = (ub.Simulation(connected(), ub.EnergyMomentum()) for _ in range(2))
     seen = []
     for n in range(6):
         for simulation in (watched, alone):
@@ -195,14 +121,7 @@ def test_states_that_were_asked_for_stay(make):
     assert not np.array_equal(seen[0][0], seen[-1][0])
     assert np.array_equal(alone.q, watched.q)
     assert np.array_equal(alone.inertia.v, watched.inertia.v)
-
-
-def test_static_steps_in_which_connectors_open_are_not_cut():
-    simulation = ub.Simulation(jointed(), ub.Static())
-    for t in np.linspace(0.0, 0.6, 31)[1:]:
-        simulation.step_to(t)
-    assert simulation.substeps == 30
-    assert simulation.entries()[2]["hinges"] > 0
+    assert "hinges" in alone.ledger.lost
 
 
 def test_no_leap_beyond_a_limit_load():
@@ -221,11 +140,8 @@ def test_no_leap_beyond_a_limit_load():
         supports=[ub.PrescribedDisplacement(apex.start, u=0.0, psi=0.0)],
         loads=[ub.PointLoad(apex.start, force=(0.0, -1.5 * limit), amplitude=ub.ramp(1.0))],
     )
-    simulation = ub.Simulation(scene, ub.Static())
-    simulation.step_to(0.5)
-    assert simulation.substeps > 1  # forces bend too much over the step to tell that nothing leapt
-    with pytest.raises(ub.ConvergenceError) as caught:
-        simulation.step_to(1.0)
+    with raises("a limit load or a bifurcation is near", kind=ub.ConvergenceError) as caught:
+        run(scene, ub.Static(), dt=0.5)
     assert 1.5 * caught.value.solution.times[-1] == pytest.approx(1.0, rel=1e-3)
 
 
@@ -248,7 +164,7 @@ def test_the_first_contact_in_statics_is_no_leap(dt, as_by_reference):
     assert solution.reaction(end)[-1, 1] == pytest.approx(force / 2, rel=1e-5)
 
 
-@pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed, driven])
+@pytest.mark.parametrize("make", [elastic, inelastic, connected])
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1, 0.05), ub.Static()], ids=str)
 def test_now_is_read_as_the_solution(make, scheme):
     """The state of a running simulation, and the last one of its solution, in all columns."""
@@ -266,20 +182,7 @@ def test_now_is_read_as_the_solution(make, scheme):
             assert np.array_equal(now.diagram(beam), solution.diagram(beam))
 
 
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1, 0.05), ub.Newmark(0.6, 0.36)], ids=str)
-def test_connectors_are_kept_in_c(scheme):
-    """Everything yields, opens or breaks, and C, not Python, keeps most of the states."""
-    scene = connected()
-    simulation, ends = ub.Simulation(scene, scheme), np.linspace(0.0, 1.0, 101)[1:]
-    calls = 0
-    while len(ends):
-        ends, calls = ends[simulation.steps_to(ends, keep=True) :], calls + 1
-    assert calls < 20
-    for connector in (*scene.connectors, *scene.hinges):
-        assert simulation.solution.connector(connector).dissipated[-1] > 0
-
-
-@pytest.mark.parametrize("make", [elastic, inelastic, connected])
+@pytest.mark.parametrize("make", [inelastic, connected])
 def test_every_other_state_stays_when_states_are_thinned(make):
     """Every other state stays, whatever kept them."""
     simulation, ends = ub.Simulation(make(), ub.EnergyMomentum()), np.linspace(0.0, 0.6, 31)[1:]
@@ -301,47 +204,6 @@ def test_every_other_state_stays_when_states_are_thinned(make):
             assert np.array_equal(solution.section_forces(beam, n), one)
 
 
-def test_what_a_load_raises_ends_the_run():
-    """The states before it remain, and the message names the load."""
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-
-    def force(t):
-        return 1.0 if t < 0.1 else "much"
-
-    load = ub.PointLoad(beam.end, force=(0.0, 1.0), amplitude=force)
-    scene = clamped(beam, loads=[load])
-    with pytest.raises(ub.ArgumentError, match="time function") as caught:
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
-    assert 8 < len(caught.value.solution) < 13
-
-
-def test_an_interrupt_while_something_opens():
-    """It passes through C, between two of the solutions that a step needs; the run goes on."""
-    of_interrupt, interrupts = [], []
-
-    def force(e, de):
-        if interrupts and any((x.points["flows"] == lib.MAY_OPEN).any() for x in of_interrupt):
-            raise interrupts.pop()
-        return 1.0 * e
-
-    def made():
-        scene = slipping()
-        spring = ub.Stretch(ub.ground(2.0, 1.0), scene.beams[2].start, ub.ForceLaw(force))
-        return dataclasses.replace(scene, connectors=[*scene.connectors, spring])
-
-    simulation, whole = (ub.Simulation(made(), ub.EnergyMomentum()) for _ in range(2))
-    end(whole, 30)
-    of_interrupt += simulation.inelastic
-    interrupts.append(KeyboardInterrupt())
-    with pytest.raises(KeyboardInterrupt):
-        end(simulation, 30)
-    done = simulation.substeps
-    assert 0 < done < 30
-    for n in range(done, 30):
-        simulation.step_to((n + 1) * 0.02)
-    assert np.array_equal(simulation.q, whole.q)
-
-
 @dataclass(frozen=True)
 class Short(ub.EnergyMomentum):
     """A scheme with a number too few."""
@@ -351,22 +213,8 @@ class Short(ub.EnergyMomentum):
 
 
 def test_coefficients_of_another_number_are_refused():
-    with pytest.raises(
-        ub.ArgumentError, match=r"Short.*coefficients.*rows have 3 \+ known finite numbers"
-    ):
+    with raises("Short", "coefficients", "rows have 3 + known finite numbers"):
         ub.Simulation(elastic(), Short())
-
-
-def test_a_slender_beam_rolls_up_in_a_few_iterations():
-    """Two full turns in one load step, where forces of displacements alone need a hundred."""
-    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e7, GA=5e6, EI=100.0), cells=32)
-    turns = ub.PointLoad(beam.end, moment=4 * np.pi * 100.0, amplitude=ub.ramp(1.0))
-    scene = clamped(beam, loads=[turns])
-    simulation = ub.Simulation(scene, ub.Static())
-    simulation.step_to(1.0)
-    assert simulation.substeps == 1
-    assert simulation.iterations <= 8
-    assert simulation.displacement(beam.end)[2] == pytest.approx(4 * np.pi, rel=1e-9)
 
 
 def test_slender_beams_yield_in_a_few_iterations():
@@ -406,7 +254,7 @@ def test_singular_tangent_is_a_failed_step():
 
 @pytest.mark.parametrize("dt", [1e-15, 1e-18])
 def test_steps_that_do_not_change_the_time_are_refused(dt):
-    with pytest.raises(ub.ArgumentError, match="too small: steps from t = 1 to 2 s"):
+    with raises("too small: steps from t = 1 to 2 s"):
         ub.simulate(elastic(), ub.EnergyMomentum(), t=(1.0, 2.0), dt=dt)
 
 

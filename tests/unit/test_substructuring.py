@@ -11,7 +11,6 @@ import ufl_beam as ub
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import bisect
-from ufl_beam.solvers import multifrontal
 from ufl_beam.solvers.multifrontal import Multifrontal
 from ufl_beam.solvers.substructuring import Summed
 
@@ -74,18 +73,15 @@ def matrix_of(name, n, seed=0):
     return csr_array(blocks + pivots)
 
 
-@pytest.mark.parametrize("n", [1, 4, 49, 225])
+@pytest.mark.parametrize("n", [1, 4, 49])
 @pytest.mark.parametrize(
     "name", ["nothing coupled", "a chain", "a square", "at random", "all coupled"]
 )
 @pytest.mark.parametrize("part", [0.0, 0.1, 1.0])
 def test_solutions_are_those_of_the_whole(name, n, part):
     """Also of a second matrix with the same pattern, and a second right-hand side."""
-    if name == "all coupled" and n > 49:
-        n = 49
-    matrix = matrix_of(name, n)
-    size = matrix.shape[0]
-    random = np.random.default_rng(1)
+    matrix = matrix_of(name, 225 if n == 49 and name != "all coupled" else n)
+    size, random = matrix.shape[0], np.random.default_rng(1)
     stays = np.repeat(random.uniform(size=size // 2) < part, 2)
     whole = Whole(matrix, np.arange(size))
     condensed = Multifrontal(whole, stays)
@@ -96,32 +92,6 @@ def test_solutions_are_those_of_the_whole(name, n, part):
             expected = np.linalg.solve(dense(whole.left), b)
             # Pivots of some 10 and less than n entries of 1: few digits of sixteen are lost.
             assert np.allclose(solve(condensed, b, again), expected, rtol=0, atol=1e-13)
-
-
-def test_the_schur_complement():
-    """Of the unknowns that stay, in their order."""
-    matrix, stays = matrix_of("a square", 49), np.zeros(98, dtype=bool)
-    stays[[2, 3, 50, 51]] = True
-    condensed = Multifrontal(Whole(matrix, np.arange(98)), stays)
-    assert condensed.factor(np.zeros(98))
-    K = matrix.toarray()
-    cut = (K[np.ix_(a, b)] for a in (stays, ~stays) for b in (stays, ~stays))
-    kk, ki, ik, ii = cut
-    expected = kk - ki @ np.linalg.solve(ii, ik)
-    assert np.allclose(dense(condensed.left), expected, rtol=0, atol=1e-12 * np.abs(kk).max())
-    assert condensed.dofs.tolist() == [2, 3, 50, 51]
-
-
-@pytest.mark.parametrize(("stays", "best"), [(0, "amd"), (20, "nd")])
-def test_the_order_of_fewest_operations(monkeypatch, stays, best):
-    """Of a square of 20 nodes a side, one side of which may stay."""
-    matrix, operations = matrix_of("a square", 400), {}
-    structure = multifrontal._structure.__wrapped__  # what it finds is kept otherwise
-    for kinds in [("amd",), ("nd",), multifrontal.ORDERINGS]:
-        monkeypatch.setattr(multifrontal, "ORDERINGS", kinds)
-        _, first, begin, *_ = structure(matrix.indptr, matrix.indices, np.arange(800) < 2 * stays)
-        operations[kinds] = multifrontal._operations(first, begin)
-    assert operations[("amd", "nd")] == operations[(best,)] == min(operations.values())
 
 
 @pytest.mark.parametrize("units", [1.0, 1e-20, 1e20])
@@ -185,14 +155,12 @@ def test_parts_have_equal_sizes_and_short_borders(number):
     cut = np.count_nonzero(np.diff(at, axis=0)) + np.count_nonzero(np.diff(at, axis=1))
     # Squares cut 2 (sqrt(number) - 1) lines; thirds, and rectangles, half as much again at most
     assert cut <= 1.5 * 2 * 64 * (number**0.5 - 1) + 8
-
-
-def test_more_parts_than_points():
-    assert sorted(bisect(np.zeros((3, 2)), 5)) == sorted(set(bisect(np.zeros((3, 2)), 5)))
+    few = bisect(np.zeros((3, 2)), 3 + number)  # more parts than points
+    assert len({*few}) == 3
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=["statics", "dynamics"])
-@pytest.mark.parametrize("number", [1, 2, 5])
+@pytest.mark.parametrize("number", [1, 5])
 def test_beams_that_share_nothing(number, scheme):
     """Under mpirun: parts without a border, processes with one cell, a force that holds a joint."""
     section = ub.Section(EA=1e4, GA=4e3, EI=10.0, rhoA=1.0, rhoI=0.01)

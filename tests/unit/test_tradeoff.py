@@ -21,22 +21,27 @@ CELLS, STEP, SECONDS, BUILDING = 1e-2, 1e-1, 1e-4, 0.1
 EFFORT = 14
 """Of the steps of all runs, of a scene without surprises, see `test_a_tolerance_is_met`."""
 LINEAR, STRICT = ub.Mesh(), ub.Newton()  # nothing else is tried
+FIRST, LOSSY = ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)
 
 
 @pytest.fixture
 def law(monkeypatch):
-    """`law(error)`: runs of these errors, of cells and steps, in the place of simulations."""
+    """`law(error, slower)`: runs of these errors and times in the place of simulations.
 
-    def use(error, seconds=lambda cells, steps: 0.1 + SECONDS * steps * (1 + cells / 50)):
+    Both are functions of `h`, `dt`, `degree`, `scheme` and `newton`; `slower` is a factor.
+    """
+
+    def use(error, slower=lambda at: 1.0):
         def simulate(scene, *, scheme, t, dt, mesh, newton, progress):
             length = dt.tolerance ** (1 / 3) if isinstance(dt, ub.Adaptive) else dt
             steps, cells = round((t[1] - t[0]) / length), int(4 * mesh.refine)
-            whole = seconds(cells, steps)
+            at = SimpleNamespace(
+                h=4 / cells, dt=length, degree=mesh.degree, scheme=scheme, newton=newton
+            )
             return SimpleNamespace(
-                seconds=whole, building=BUILDING,
-                substeps=steps, iterations=2 * steps,
-                numbering=SimpleNamespace(cells=range(cells)),
-                value=1.0 + error(4 / cells, length, scheme, newton),
+                seconds=BUILDING + SECONDS * steps * (1 + cells / 50) * slower(at),
+                building=BUILDING, substeps=steps, iterations=2 * steps,
+                numbering=SimpleNamespace(cells=range(cells)), value=1.0 + error(at),
             )  # fmt: skip
 
         monkeypatch.setattr(tradeoff, "simulate", simulate)
@@ -44,17 +49,24 @@ def law(monkeypatch):
     return use
 
 
-def smooth(h, dt, scheme, newton):
+def smooth(at):
     """Second order in both."""
-    return CELLS * h**2 - STEP * dt**2
+    return CELLS * at.h**2 - STEP * at.dt**2
 
 
-def ask(*, scheme=None, dt=0.1, mesh=LINEAR, newton=STRICT, **goal):
+def of_cells(at):
+    return CELLS * at.h**2
+
+
+def ask(*, scheme=FIRST, dt=0.1, mesh=LINEAR, newton=STRICT, **goal):
     return ub.tradeoff(
-        SCENE, {"value": lambda s: s.value}, scheme=scheme or ub.EnergyMomentum(), t=(0.0, 10.0),
-        dt=dt,
-        mesh=mesh, newton=newton, **goal,
+        SCENE, {"value": lambda s: s.value}, scheme=scheme, t=(0.0, 10.0), dt=dt, mesh=mesh,
+        newton=newton, **goal,
     )  # fmt: skip
+
+
+def error_of(found):
+    return abs(found.best.values["value"] - 1.0)
 
 
 # -- laws --------------------------------------------------------------------------------------
@@ -64,8 +76,7 @@ def ask(*, scheme=None, dt=0.1, mesh=LINEAR, newton=STRICT, **goal):
 def test_a_tolerance_is_met(law, tolerance):
     law(smooth)
     found = ask(tolerance={"value": tolerance})
-    best = found.best
-    error = abs(best.values["value"] - 1.0)
+    best, error = found.best, error_of(found)
     assert 0.3 * tolerance <= error <= tolerance
     # Three levels of cells and of steps around a base, of 13 times its time: up to 7 times that of
     # the answer, and a seventh of that of the bases before.  The run that confirms it: 4 times.
@@ -90,27 +101,46 @@ def test_a_tolerance_is_met(law, tolerance):
     assert found.spent >= sum(run.seconds for run in found.runs)
 
 
-@pytest.mark.parametrize("order", [1.0, 1.5])
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-def test_orders_that_are_not_those_of_theory(law, order, tolerance):
-    law(lambda h, dt, scheme, newton: CELLS * h**2 + STEP * dt**order)
-    found = ask(tolerance={"value": tolerance})
-    error = abs(found.best.values["value"] - 1.0)
-    assert 0.3 * tolerance <= error <= tolerance
-    assert found.effort <= EFFORT
+def orders(cells, steps):
+    return lambda at: CELLS * at.h**cells + STEP * at.dt**steps
 
 
-def test_noise_below_the_tolerance_does_no_harm(law):
-    """A quantity that jumps to and fro by a tenth of what is asked."""
+def noisy(at):
+    """Jumps to and fro by a tenth of the tolerance."""
+    return smooth(at) + 2e-5 * math.sin(1e4 * at.h + 1e5 * at.dt)
 
-    def error(h, dt, scheme, newton):
-        return smooth(h, dt, scheme, newton) + 2e-5 * math.sin(1e4 * h + 1e5 * dt)
 
+def failing(at):
+    """Coarse steps have no equilibrium."""
+    if at.dt > 0.06:
+        raise ub.ConvergenceError(
+            "no equilibrium", time=0.0, dt=at.dt, solution=None, residuals={}, forces={}
+        )
+    return smooth(at)
+
+
+@pytest.mark.parametrize(
+    ("error", "tolerance", "options", "effort"),
+    [
+        (orders(2, 1.0), 1e-2, {}, EFFORT),
+        (orders(2, 1.0), 1e-3, {}, EFFORT),
+        (orders(2, 1.5), 1e-3, {}, EFFORT),
+        # Levels on which changes are looked for are finer than such an error requires.
+        (noisy, 2e-4, {}, 2 * EFFORT),
+        # Cells of degree 2 with errors of second order, as of polygons in the place of arcs
+        (of_cells, 3e-3, {"mesh": ub.Mesh(degree=2)}, math.inf),
+        (of_cells, 1e-5, {"mesh": ub.Mesh(degree=2)}, math.inf),
+        (smooth, 1e-4, {"dt": ub.Adaptive(1e-3)}, math.inf),
+        (failing, 1e-5, {}, math.inf),
+    ],
+)
+def test_a_tolerance_is_met_without_theory(law, error, tolerance, options, effort):
     law(error)
-    found = ask(tolerance={"value": 2e-4})
-    assert abs(found.best.values["value"] - 1.0) <= 2e-4
-    # The levels on which changes are looked for are finer than such an error requires.
-    assert found.effort <= 2 * EFFORT
+    found = ask(tolerance={"value": tolerance}, **options)
+    assert error_of(found) <= tolerance
+    assert found.effort <= effort
+    assert effort != EFFORT or 0.3 * tolerance <= error_of(found)
+    assert "dt" not in options or found.best.setting.dt.tolerance < 1e-3
 
 
 def test_a_scene_that_is_accurate_enough_stays_as_it_is(law):
@@ -125,82 +155,52 @@ def test_a_scene_that_is_accurate_enough_stays_as_it_is(law):
 @pytest.mark.parametrize(("slower", "degree"), [(1, 2), (1000, 1)])
 def test_degree_two_is_proposed_where_it_helps(law, slower, degree):
     """Errors of fourth order; cells that take as long as those of degree 1, or much longer."""
-
-    def error(h, dt, scheme, newton):
-        return CELLS * h ** (2 * law.degree) + STEP * dt**2
-
-    law(error)
-    simulate = tradeoff.simulate
-
-    def with_degree(scene, *, mesh, **others):
-        law.degree = mesh.degree
-        one = simulate(scene, mesh=mesh, **others)
-        one.seconds *= slower ** (mesh.degree - 1)
-        return one
-
-    tradeoff.simulate = with_degree  # the fixture restores it
+    law(
+        lambda at: CELLS * at.h ** (2 * at.degree) + STEP * at.dt**2,
+        lambda at: slower ** (at.degree - 1),
+    )
     found = ask(mesh=None, tolerance={"value": 1e-5})
     assert found.best.setting.mesh.degree == degree
-    assert 0.3e-5 <= abs(found.best.values["value"] - 1.0) <= 1e-5
+    assert 0.3e-5 <= error_of(found) <= 1e-5
     if degree == 2:
         assert found.effort <= EFFORT
 
 
 def test_degree_two_is_left_where_the_scene_has_none(law):
-    law(smooth)
-    simulate = tradeoff.simulate
-
-    def refuse(scene, *, mesh, **others):
-        if mesh.degree > 1:
+    def error(at):
+        if at.degree > 1:
             raise ub.ArgumentError("Mesh: degree 2 is not for this scene")
-        return simulate(scene, mesh=mesh, **others)
+        return smooth(at)
 
-    tradeoff.simulate = refuse  # the fixture restores it
+    law(error)
     found = ask(mesh=None, tolerance={"value": 1e-4})
     assert found.best.setting.mesh.degree == 1
-    assert 0.3e-4 <= abs(found.best.values["value"] - 1.0) <= 1e-4
+    assert 0.3e-4 <= error_of(found) <= 1e-4
 
 
-def test_other_options_of_newtons_method_are_proposed_where_they_help(law):
-    law(smooth)
-    simulate, other = tradeoff.simulate, ub.Newton(max_iterations=20)
-
-    def with_newton(scene, *, newton, **others):
-        one = simulate(scene, newton=newton, **others)
-        one.seconds = BUILDING + (one.seconds - BUILDING) * (law.part if newton == other else 1.0)
-        return one
-
-    tradeoff.simulate = with_newton  # the fixture restores it
-    for law.part in (0.5, 1.5):
-        found = ask(newton=[ub.Newton(), other], tolerance={"value": 1e-4})
-        assert (found.best.setting.newton == other) == (law.part < 1)
-        # It was tried on a coarse run.
-        tried = [run for run in found.runs if run.setting.newton == other]
-        assert min(run.steps for run in tried) < found.best.steps
+@pytest.mark.parametrize(
+    ("part", "change", "taken"), [(0.5, 1e-7, True), (1.0, 1e-7, False), (0.5, 1e-3, False)]
+)
+def test_another_newton_is_taken_if_it_is_faster_and_changes_little(law, part, change, taken):
+    other = ub.Newton(rtol=1e-6)
+    law(
+        lambda at: smooth(at) + (change if at.newton == other else 0.0),
+        lambda at: part if at.newton == other else 1.0,
+    )
+    found = ask(newton=[STRICT, other], tolerance={"value": 1e-4})
+    assert (found.best.setting.newton == other) == taken
+    # It was tried on a coarse run.
+    tried = [run for run in found.runs if run.setting.newton == other]
+    assert min(run.steps for run in tried) < found.best.steps
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_no_run_is_done_twice(law, seed):
+def test_no_run_is_done_twice(law):
     """Whatever the times of the runs, by which options of Newton's method are chosen."""
-    law(smooth)
-    simulate, random = tradeoff.simulate, np.random.default_rng(seed)
-
-    def by_chance(scene, **others):
-        one = simulate(scene, **others)
-        one.seconds = BUILDING + (one.seconds - BUILDING) * random.uniform(0.5, 1.5)
-        return one
-
-    tradeoff.simulate = by_chance  # the fixture restores it
-    found = ask(mesh=None, newton=None, tolerance={"value": 1e-4})
-    assert len({str(run.setting) for run in found.runs}) == len(found.runs)
-
-
-@pytest.mark.parametrize("tolerance", [3e-3, 1e-3, 1e-4, 1e-5])
-def test_an_order_below_that_in_theory_does_not_exceed_the_tolerance(law, tolerance):
-    """Cells of degree 2 with errors of second order, as of polygons in the place of arcs."""
-    law(lambda h, dt, scheme, newton: CELLS * h**2)
-    found = ask(mesh=ub.Mesh(degree=2), tolerance={"value": tolerance})
-    assert abs(found.best.values["value"] - 1.0) <= tolerance
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        law(smooth, lambda at, random=random: random.uniform(0.5, 1.5))
+        found = ask(mesh=None, newton=None, tolerance={"value": 1e-4})
+        assert len({str(run.setting) for run in found.runs}) == len(found.runs)
 
 
 @pytest.mark.parametrize("budget", [0.3, 1.0, 10.0])
@@ -232,169 +232,109 @@ def test_the_recommendation_are_arguments_of_simulate(law):
 
 
 def test_a_dial_that_does_nothing_stays_as_it_is(law):
-    law(lambda h, dt, scheme, newton: CELLS * h**2)
+    law(of_cells)
     assert ask(tolerance=1e-5).best.setting.dt == 0.1
-    law(lambda h, dt, scheme, newton: STEP * dt)  # of first order
-    best = ask(tolerance=1e-4).best
-    assert best.setting.mesh.refine == 1
-    assert 0.5e-4 < abs(best.values["value"] - 1.0) <= 1e-4
+    law(lambda at: STEP * at.dt)  # of first order
+    found = ask(tolerance=1e-4)
+    assert found.best.setting.mesh.refine == 1
+    assert 0.5e-4 < error_of(found) <= 1e-4
 
 
 def test_the_better_scheme_wins(law):
     """The second one needs steps ten times as short for the same error."""
-    first, second = ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)
-    law(lambda h, dt, scheme, newton: smooth(h, (1 + 90 * scheme.alpha) * dt, scheme, newton))
-    for schemes in ([first, second], [second, first]):
+    law(lambda at: CELLS * at.h**2 - STEP * ((1 + 90 * at.scheme.alpha) * at.dt) ** 2)
+    for schemes in ([FIRST, LOSSY], [LOSSY, FIRST]):
         found = ask(scheme=schemes, tolerance=1e-4)
-        assert found.best.setting.scheme == first
-    assert any("given up" in note for note in ask(scheme=[first, second], tolerance=1e-4).notes)
-
-
-def test_adaptive_steps_go_by_their_tolerance(law):
-    law(smooth)
-    found = ask(dt=ub.Adaptive(1e-3), tolerance=1e-4)
-    assert found.best.setting.dt.tolerance < 1e-3
-    assert abs(found.best.values["value"] - 1.0) <= 1e-4
-
-
-@pytest.mark.parametrize(("change", "taken"), [(1e-7, True), (1e-3, False)])
-def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
-    def error(h, dt, scheme, newton):
-        law.loose = newton.rtol > 1e-8
-        return smooth(h, dt, scheme, newton) + change * law.loose
-
-    def seconds(cells, steps):
-        return (0.1 + SECONDS * steps * (1 + cells / 50)) * (0.5 if law.loose else 1.0)
-
-    law(error, lambda cells, steps: 0.1 + SECONDS * steps * (1 + cells / 50))
-    strict, loose = ub.Newton(), ub.Newton(rtol=1e-6)
-    # Equal times are no reason to change.
-    found = ask(tolerance=1e-4, newton=[strict, loose])
-    assert found.best.setting.newton == strict
-    assert any(run.setting.newton == loose for run in found.runs)
-    simulate = tradeoff.simulate
-
-    def faster(scene, *, newton, **others):
-        one = simulate(scene, newton=newton, **others)
-        one.seconds *= 0.5 if newton == loose else 1.0
-        return one
-
-    tradeoff.simulate = faster  # the fixture restores it
-    found = ask(tolerance=1e-4, newton=[strict, loose])
-    assert found.best.setting.newton == (loose if taken else strict)
+        assert found.best.setting.scheme == FIRST
+        assert schemes[0] == LOSSY or any("given up" in note for note in found.notes)
 
 
 def test_schemes_that_converge_to_different_limits_are_named(law):
-    law(lambda h, dt, scheme, newton: smooth(h, dt, scheme, newton) + 0.1 * (scheme.alpha > 0))
-    found = ask(scheme=[ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], tolerance=1e-3)
+    law(lambda at: smooth(at) + 0.1 * (at.scheme.alpha > 0))
+    found = ask(scheme=[FIRST, LOSSY], tolerance=1e-3)
     assert any("its limit of value differs by 0.1 from" in note for note in found.notes)
 
 
 def test_dials_that_a_scene_cannot_have_leave_the_others(law):
-    def error(h, dt, scheme, newton):
-        if scheme.alpha > 0:
+    def error(at):
+        if at.scheme.alpha > 0:
             raise ub.ArgumentError("EnergyMomentum: not for this scene")
-        return smooth(h, dt, scheme, newton)
+        return smooth(at)
 
     law(error)
-    found = ask(scheme=[ub.EnergyMomentum(alpha=0.1), ub.EnergyMomentum()], tolerance=1e-3)
-    assert found.best.setting.scheme == ub.EnergyMomentum()
+    found = ask(scheme=[LOSSY, FIRST], tolerance=1e-3)
+    assert found.best.setting.scheme == FIRST
     assert "not for this scene" in found.notes[0]
     with raises("not for this scene"):
-        ask(scheme=ub.EnergyMomentum(alpha=0.1), tolerance=1e-3)
+        ask(scheme=LOSSY, tolerance=1e-3)
 
 
-# -- refusals ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("goal", [{"tolerance": 1e-3}, {"budget": 2.0}])
-def test_chaos_is_refused(law, goal):
-    law(lambda h, dt, scheme, newton: math.sin(1e4 / dt + 1e4 / h))
-    with raises(
-        "self-convergence is not seen", "steps: changes by", kind=errors.TradeoffError
-    ) as info:
-        ask(**goal)
-    assert len(info.value.runs) > 6
-
-
-def test_divergence_is_refused(law):
-    law(lambda h, dt, scheme, newton: 1e-3 / dt)
-    with raises("self-convergence is not seen", "order -1.00", kind=errors.TradeoffError):
-        ask(tolerance=1e-3)
-
-
-def test_what_would_take_too_long_is_refused(law):
-    law(smooth)
-    with raises(
-        "runs would take about", "more than max_seconds = 5 s", kind=errors.TradeoffError
-    ) as info:
-        ask(tolerance=1e-8, max_seconds=5.0)
-    assert info.value.runs
-
-
-def test_what_there_is_no_time_for_is_left_out(law):
+def test_runs_without_time_for_them_are_left_out(law):
     """Checks and other options of Newton's method, once there is a setting that serves."""
     law(smooth)
     whole = ask(tolerance=1e-4, newton=None)
     found = ask(tolerance=1e-4, newton=None, max_seconds=0.99 * whole.spent)
     assert len(found.runs) < len(whole.runs)
     assert found.spent < whole.spent
-    assert abs(found.best.values["value"] - 1.0) <= 1e-4
+    assert error_of(found) <= 1e-4
 
 
-def test_a_budget_below_the_coarsest_run_is_refused(law):
-    law(smooth)
-    with raises("no setting serves", "the nearest takes", kind=errors.TradeoffError):
-        ask(budget=0.05)
+# -- refusals ----------------------------------------------------------------------------------
 
 
-def test_coarse_steps_that_fail_are_left_out(law):
-    def error(h, dt, scheme, newton):
-        if dt > 0.06:
-            raise ub.ConvergenceError(
-                "no equilibrium", time=0.0, dt=dt, solution=None, residuals={}, forces={}
-            )
-        return smooth(h, dt, scheme, newton)
+def chaos(at):
+    return math.sin(1e4 / at.dt + 1e4 / at.h)
 
+
+@pytest.mark.parametrize(
+    ("error", "goal", "says", "runs"),
+    [
+        (chaos, {"tolerance": 1e-3}, ["self-convergence is not seen", "steps: changes by"], 7),
+        (chaos, {"budget": 2.0}, ["self-convergence is not seen", "steps: changes by"], 7),
+        (
+            lambda at: 1e-3 / at.dt, {"tolerance": 1e-3},
+            ["self-convergence is not seen", "order -1.00"], 0,
+        ),
+        (
+            smooth, {"tolerance": 1e-8, "max_seconds": 5.0},
+            ["runs would take about", "more than max_seconds = 5 s"], 1,
+        ),
+        (smooth, {"budget": 0.05}, ["no setting serves", "the nearest takes"], 0),
+    ],
+    ids=["chaos", "chaos in a budget", "divergence", "too long", "too small a budget"],
+)  # fmt: skip
+def test_goals_that_cannot_be_reached_are_refused(law, error, goal, says, runs):
     law(error)
-    found = ask(tolerance=1e-5)
-    assert abs(found.best.values["value"] - 1.0) <= 1e-5
+    with raises(*says, kind=errors.TradeoffError) as info:
+        ask(**goal)
+    assert len(info.value.runs) >= runs
 
 
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        ({}, ("give either a tolerance or a budget",)),
-        ({"tolerance": 1.0, "budget": 1.0}, ("give either a tolerance or a budget",)),
-        ({"tolerance": -1.0}, ("tolerance = -1 must be positive",)),
-        ({"tolerance": {"tip": 1.0}}, ("tolerance is of tip, quantities are value",)),
-        ({"tolerance": {"value": 0.0}}, ("tolerance of value = 0 must be positive",)),
-        ({"budget": math.inf}, ("budget = inf is not finite",)),
-        ({"budget": 1.0, "max_seconds": 0}, ("max_seconds = 0 must be positive",)),
-        ({"budget": 1.0, "scheme": ()}, ("scheme = ",)),
-        ({"budget": 1.0, "dt": []}, ("dt is empty",)),
-        ({"budget": 1.0, "dt": -1.0}, ("dt = -1 must be positive",)),
-        ({"budget": 1.0, "newton": [1]}, ("newton[0] = 1 is not a Newton",)),
-        ({"budget": 1.0, "mesh": [2]}, ("mesh[0] = 2 is not a Mesh",)),
+        ({}, "give either a tolerance or a budget"),
+        ({"tolerance": 1.0, "budget": 1.0}, "give either a tolerance or a budget"),
+        ({"tolerance": {"tip": 1.0}}, "tolerance is of tip, quantities are value"),
+        ({"tolerance": {"value": 0.0}}, "tolerance of value = 0 must be positive"),
+        ({"budget": 1.0, "scheme": []}, "scheme is empty"),
+        ({"budget": 1.0, "dt": []}, "dt is empty"),
+        ({"budget": 1.0, "newton": [1]}, "newton[0] = 1 is not a Newton"),
+        ({"budget": 1.0, "mesh": [2]}, "mesh[0] = 2 is not a Mesh"),
     ],
 )
 def test_wrong_calls_are_refused(call, says):
     call = {"scheme": ub.Static(), "t": (0, 1), "dt": 0.5, **call}
-    if call["scheme"] == ():
-        call["scheme"], says = [], ("scheme is empty",)
-    with raises(*says):
+    with raises(says):
         ub.tradeoff(SCENE, {"value": lambda s: 1.0}, **call)
 
 
 @pytest.mark.parametrize(
     ("quantities", "says"),
     [
-        ({}, ("quantities is empty",)),
-        ([1], ("quantities = [1] is not a Mapping",)),
-        ({"tip": 1.0}, ("quantity 'tip' = 1.0 must be a function of a Solution",)),
-        ({"q": lambda s: s.times}, ("quantity 'q' has shape (3,)", "np.interp")),
-        ({"q": lambda s: math.nan}, ("quantity 'q' is not finite",)),
-        ({"q": lambda s: 0.0}, ("quantity 'q' is zero",)),
+        ({"q": lambda s: s.times}, ["quantity 'q' has shape (3,)", "np.interp"]),
+        ({"q": lambda s: math.nan}, ["quantity 'q' is not finite"]),
+        ({"q": lambda s: 0.0}, ["quantity 'q' is zero"]),
     ],
 )
 def test_wrong_quantities_are_refused(quantities, says):
@@ -403,27 +343,6 @@ def test_wrong_quantities_are_refused(quantities, says):
 
 
 # -- scenes ------------------------------------------------------------------------------------
-
-
-def test_statics_needs_cells_alone():
-    section = ub.Section(EA=1e8, GA=1e8, EI=100.0)
-    scene = scenes.cantilever(section, cells=2, force=(0.0, -300.0))
-    tip = scene.beams[0].end
-
-    def end(solution):
-        return solution.position(tip)[-1]
-
-    found = ub.tradeoff(
-        scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
-    )
-    assert found.best.setting.dt == 0.5
-    again = ub.simulate(scene, **found.recommended, comm=MPI.COMM_SELF)
-    fine = ub.simulate(
-        scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100), comm=MPI.COMM_SELF
-    )
-    # Of second order in the cells: those of the reference leave 1e-6.
-    assert np.abs(end(again) - end(fine)).max() < 1e-3
-    assert np.abs(found.limit["tip"] - end(fine)).max() < found.uncertainty["tip"] + 1e-5
 
 
 def test_cells_and_steps_of_a_vibration_are_chosen():
@@ -435,16 +354,9 @@ def test_cells_and_steps_of_a_vibration_are_chosen():
     def history(solution):
         return np.interp(at, solution.times, solution.displacement(tip)[:, 1])
 
-    found = ub.tradeoff(
-        scene, {"tip": history}, scheme=ub.EnergyMomentum(), t=(0, 3), dt=0.25, tolerance=0.02
-    )
+    found = ub.tradeoff(scene, {"tip": history}, scheme=FIRST, t=(0, 3), dt=0.25, tolerance=0.02)
     fine = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(0, 3),
-        dt=0.25 / 64,
-        mesh=ub.Mesh(refine=32),
-        comm=MPI.COMM_SELF,
+        scene, FIRST, t=(0, 3), dt=0.25 / 64, mesh=ub.Mesh(refine=32), comm=MPI.COMM_SELF
     )
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size

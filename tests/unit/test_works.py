@@ -5,9 +5,6 @@ import math
 import re
 from functools import partial
 from pathlib import Path
-from unittest import mock
-
-from mpi4py import MPI
 
 import numpy as np
 import pytest
@@ -16,12 +13,10 @@ from helpers import raises, require_restart, run
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
-from ufl_beam.compiled import jit
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.plotting.model import model_notes
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
-EXACT = [ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1), ub.EnergyMomentumDecaying(0.6)]
 
 
 def soil(q, k):
@@ -63,21 +58,12 @@ run = partial(run, t=(0, 2), dt=0.05)
 # -- ledger ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", EXACT)
-@pytest.mark.parametrize("b", [5.0, lambda t: 5 * math.cos(3 * t)], ids=["steady", "in time"])
-def test_the_ledger_closes(scheme, b):
+def test_the_ledger_closes():
     """To 1e-9; sin ψ is integrated over a step of 0.2 rad to 0.2⁹/2e9 of itself."""
-    energy = run(flying(b), scheme).energy
+    energy = run(flying(lambda t: 5 * math.cos(3 * t)), ub.EnergyMomentum(0.1, 0.1)).energy
     assert energy.worst < 1e-9
-    assert np.ptp(energy["soil"]) > 1 < np.ptp(energy["magnet"])
+    assert min(np.ptp(energy[name]) for name in ("soil", "magnet", "magnet in time")) > 1
     assert energy["air"][-1] < -1
-    assert ("magnet in time" in energy.supplied) == callable(b)
-    if callable(b):
-        assert np.ptp(energy["magnet in time"]) > 1
-
-
-def test_the_ledger_closes_on_cells_of_higher_degree():
-    assert run(flying(), mesh=ub.Mesh(degree=3), t=(0, 0.5)).energy.worst < 1e-9
 
 
 def test_the_ledger_of_schemes_at_the_end_is_of_second_order():
@@ -95,83 +81,21 @@ def test_the_ledger_of_schemes_at_the_end_is_of_second_order():
     assert np.log2(worst[1] / worst[2]) == pytest.approx(2, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic()]
-)
-def test_a_quadratic_potential_in_statics(scheme):
-    """A stiff beam on springs sinks by F/(k L); the trapezoidal rule of its work is exact."""
-    stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9)
-    beam = ub.Beam((0, 0), (2, 0), stiff, cells=4)
-    load = ub.PointLoad(beam.at(0.5), force=(0, -3e-3), amplitude=lambda t: t)
-    ground = ub.Potential("soil", soil, numbers={"k": 50.0})
-    solution = run(ub.Scene([beam], loads=[load], works=[ground]), scheme, t=(0, 1), dt=0.25)
-    # 50 N/m² twice, on 2 m.  Bending is k L⁴/EI = 2e-6 of it, less in its effect.
-    assert solution.displacement(beam.end)[-1, 1] == pytest.approx(-3e-3 / 200, rel=1e-6)
-    assert solution.energy.worst < 1e-9
-    state = 200 * (3e-3 / 200) ** 2 / 2
-    assert solution.energy["soil"][-1] == pytest.approx(state, rel=1e-6)
-
-
-def test_dissipation_of_the_scheme_is_that_of_a_spring():
-    """EnergyMomentum(alpha) loses alpha k (Δu)² in a step: as the same potential by springs."""
-    stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=1.0, rhoI=1.0)
-
-    def dropped(*works, connectors=()):
-        beam = ub.Beam((0, 0), (1, 0), stiff, cells=1)
-        up = ub.Velocity((beam,), linear=(0.0, 1.0))
-        places = [c(beam) for c in connectors]
-        scene = ub.Scene([beam], initial=[up], works=works, connectors=places)
-        return run(scene, ub.EnergyMomentum(alpha=0.2), t=(0, 0.5), dt=0.05).energy
-
-    def spring(end):
-        def make(beam):
-            at = getattr(beam, end)
-            return ub.Slide(ub.ground(*at.point), at, ub.Spring(25.0), axis=(0, 1))
-
-        return make
-
-    on_soil = dropped(ub.Potential("soil", lambda q: 25.0 * q[1] ** 2))
-    on_springs = dropped(connectors=[spring("start"), spring("end")])
-    lost = on_springs["numerical"]
-    assert lost[-1] > 0.1
-    np.testing.assert_allclose(on_soil["numerical"], lost, rtol=1e-8)
-
-
 # -- against the package's own loads -----------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentum()])
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentumStatic(), ub.EnergyMomentum()])
 def test_a_dead_work_is_a_line_load(scheme):
     """Also where steps are cut, and where it is there from the start."""
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
-    held = [ub.Clamped(beam.start)]
     load = ub.LineLoad(beam, force=(-20.0, 30.0), moment=5.0)
     work = ub.VirtualWork("load", lambda w: -20.0 * w[0] + 30.0 * w[1] + 5.0 * w[2])
-    loaded, worked = (
-        run(ub.Scene([beam], supports=held, **by), scheme, t=(0, 1), dt=0.25)
-        for by in ({"loads": [load]}, {"works": [work]})
-    )
+    scenes = clamped(beam, loads=[load]), clamped(beam, works=[work])
+    loaded, worked = (run(scene, scheme, t=(0, 1), dt=0.25) for scene in scenes)
     np.testing.assert_allclose(worked.q, loaded.q, atol=1e-9 * np.abs(loaded.q).max())
-    np.testing.assert_allclose(
-        worked.reaction(held[0])[1:], loaded.reaction(held[0])[1:], rtol=1e-7, atol=1e-7
-    )
+    forces = (one.reaction(one.scene.supports[0])[1:] for one in (worked, loaded))
+    np.testing.assert_allclose(*forces, rtol=1e-7, atol=1e-7)
     np.testing.assert_allclose(worked.energy["load"], loaded.energy["loads"], rtol=1e-7, atol=1e-9)
-
-
-def test_a_path_of_a_work():
-    """The load factor is its time."""
-    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
-    held = [ub.Clamped(beam.start)]
-    load = ub.LineLoad(beam, force=(0.0, 30.0), amplitude=lambda t: t)
-    work = ub.VirtualWork("load", lambda w, t: 30.0 * t * w[1])
-    loaded, worked = (
-        ub.follow(
-            ub.Scene([beam], supports=held, **by), ub.ArcLength(0.1), until=lambda at: at.t > 1.0
-        )
-        for by in ({"loads": [load]}, {"works": [work]})
-    )
-    np.testing.assert_allclose(worked.times, loaded.times, atol=1e-8)
-    np.testing.assert_allclose(worked.q, loaded.q, atol=1e-8)
 
 
 # -- small motions -----------------------------------------------------------------------------
@@ -181,37 +105,33 @@ FINE = ub.Mesh(refine=8, degree=2)
 """16 cells of degree 3: of a wave with n halves (n π/16)⁶/40 of the stiffness is missing, 1e-6."""
 
 
-def column(k):
+def column(k, *works):
+    """A pinned beam of length π on an elastic foundation."""
     # Strains and shear count 1e-6; round-off of so slender a column counts less.
     section = ub.Section(EA=1e7, GA=1e7, EI=1.0, rhoA=2.0, rhoI=0.0)
     beam = ub.Beam((0, 0), (math.pi, 0), section, cells=8)
     held = [ub.Pinned(beam.start), ub.Roller(beam.end)]
     bed = ub.Potential("bed", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": k})
-    return beam, held, bed
+    push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
+    return ub.Scene([beam], supports=held, loads=[push], works=[bed, *works])
 
 
 def test_frequencies_on_an_elastic_foundation():
-    """ω² = (EI (nπ/L)⁴ + k)/ρA of a pinned beam of length π [closed]."""
-    beam, held, bed = column(7.0)
-    found = ub.modes(ub.Scene([beam], supports=held, works=[bed]), 3, mesh=FINE)
+    """ω² = (EI (nπ/L)⁴ + k)/ρA [closed]."""
+    found = ub.modes(column(7.0), 3, mesh=FINE)
     np.testing.assert_allclose(found.omega**2, [(n**4 + 7) / 2 for n in (1, 2, 3)], rtol=5e-6)
 
 
 def test_damping_ratio_of_viscous_air():
     """c/(2 ρA ω) [closed]."""
-    beam, held, bed = column(7.0)
     drag = ub.VirtualWork("drag", lambda v, w: -0.3 * v[1] * w[1])
-    scene = ub.Scene([beam], supports=held, works=[bed, drag])
-    found = ub.modes(scene, 2, mesh=FINE)
+    found = ub.modes(column(7.0, drag), 2, mesh=FINE)
     np.testing.assert_allclose(found.damping, 0.3 / (4 * found.omega), rtol=5e-6)
 
 
 def test_buckling_on_an_elastic_foundation():
     """P = EI m² + k/m² for m half waves on a length π: two waves of four [closed]."""
-    beam, held, bed = column(10.0)
-    push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
-    scene = ub.Scene([beam], supports=held, loads=[push], works=[bed])
-    factors = ub.buckling(scene, 2, mesh=FINE).factors
+    factors = ub.buckling(column(10.0), 2, mesh=FINE).factors
     np.testing.assert_allclose(factors, [4 + 10 / 4, 9 + 10 / 9], rtol=5e-6)
 
 
@@ -220,38 +140,17 @@ def test_buckling_by_a_field():
 
     The field grows from that of the state, which is none, to that at the time t.
     """
-    section = ub.Section(EA=1e9, GA=1e9, EI=1.0)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e9, GA=1e9, EI=1.0), cells=4)
     push = ub.PointLoad(beam.end, force=(-1.0, 0.0))
-
-    def critical(b):
+    for b in (0.0, 1.0, 2.0):
+        # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
         field = ub.Potential("field", lambda q, b: b * ufl.cos(q[2]), numbers={"b": b})
         scene = clamped(beam, loads=[push], works=[field])
-        return ub.buckling(scene, 1, mesh=ub.Mesh(degree=3)).factors[0]
-
-    # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
-    for b in (0.0, 1.0, 2.0):
-        assert critical(b) == pytest.approx((math.pi / 2) ** 2 - b, rel=1e-6)
-
-
-def test_buckling_refuses_works_without_potential():
-    beam, held, _ = column(1.0)
-    scene = ub.Scene([beam], supports=held, works=[ub.VirtualWork("air", lambda v, w: v[1] * w[1])])
-    with pytest.raises(ub.ArgumentError, match="the VirtualWork has a stiffness of its own"):
-        ub.buckling(scene, 1)
-
-
-# -- compilation -------------------------------------------------------------------------------
-
-
-def test_numbers_times_and_steps_compile_nothing(monkeypatch):
-    for b in (5.0, lambda t: 5.0 + t):  # power of a potential that varies in time is one term more
-        run(flying(b), dt=0.1)
-    monkeypatch.setattr(jit, "cached", mock.Mock(side_effect=AssertionError("compiled again")))
-    first = run(flying(b=7.0), dt=0.1)
-    run(flying(b=lambda t: 7.0 + t), dt=0.03)
-    other = run(flying(), dt=0.1)
-    assert np.abs(first.q[-1] - other.q[-1]).max() > 1e-3
+        [factor] = ub.buckling(scene, 1, mesh=ub.Mesh(degree=2, refine=10)).factors
+        assert factor == pytest.approx((math.pi / 2) ** 2 - b, rel=1e-6)
+    work = ub.VirtualWork("air", lambda v, w: v[1] * w[1])
+    with raises("the VirtualWork has a stiffness of its own"):
+        ub.buckling(clamped(beam, loads=[push], works=[work]), 1)
 
 
 def test_a_number_may_have_any_name():
@@ -265,44 +164,12 @@ def test_a_number_may_have_any_name():
     assert momentum(growth=3.0) == pytest.approx(3.0)
 
 
-def test_a_scene_without_works_has_no_term():
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    simulation = ub.Simulation(ub.Scene([beam]), ub.EnergyMomentum())
-    assert not simulation.loads
-    assert "loads" not in simulation.ledger.supplied
-
-
 # -- processes, checkpoints, files -------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Newmark()])
-def test_the_reference_path(scheme, as_by_reference):
-    """DOLFINx assembles the same forms."""
-    newton = ub.Newton(rtol=1e-12)
-    as_by_reference(run(flying(lambda t: 5 + t), scheme, t=(0, 0.5), newton=newton))
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Newmark()])
-def test_any_number_of_processes(scheme):
-    """Beams of which some processes have no cell."""
-    scene = flying(cells=6)
-    together, alone = (run(scene, scheme, comm=c) for c in (MPI.COMM_WORLD, MPI.COMM_SELF))
-    assert np.abs(together.q - alone.q).max() < 1e-9
-    for name in ("soil", "magnet", "air"):
-        np.testing.assert_allclose(together.energy[name], alone.energy[name], atol=1e-8)
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Newmark(), ub.GeneralizedAlpha()])
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1, 0.1), ub.Newmark()], ids=repr)
 def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
-    require_restart(run, flying(lambda t: 5 + t), (), scheme, shared_path, until=2)
-
-
-@pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")  # motion in time is meant
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
-def test_restart_in_statics(scheme, shared_path):
-    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
-    scene = clamped(beam, works=works(b=lambda t: 5 + t))
-    require_restart(partial(run, dt=0.2), scene, (), scheme, shared_path, until=2)
+    require_restart(run, flying(lambda t: 5 + t), (), scheme, shared_path, until=1)
 
 
 def test_a_continued_run():
@@ -317,15 +184,13 @@ def test_a_continued_run():
     assert np.allclose(second.reaction(scene.supports[0]), first.reaction(scene.supports[0])[-1])
 
 
-def test_a_picture_names_the_works():
-    notes = model_notes(flying())
-    assert "magnet: acts as its function says on beam" in notes
-    assert "air: acts as its function says" in notes
-
-
 @pytest.mark.serial
-def test_a_saved_solution_knows_its_works(tmp_path):
-    solution = run(flying(lambda t: 5 + t), t=(0, 0.2))
+def test_a_picture_and_a_saved_solution_know_the_works(tmp_path):
+    scene = flying(lambda t: 5 + t)
+    assert {"magnet: acts as its function says on beam", "air: acts as its function says"} <= {
+        *model_notes(scene)
+    }
+    solution = run(scene, t=(0, 0.2))
     solution.save(tmp_path / "run.solution")
     loaded = ub.Solution.load(tmp_path / "run.solution")
     assert [work.name for work in loaded.scene.works] == ["soil", "magnet", "air"]
@@ -358,57 +223,35 @@ BODY = ub.Body((0, 0), mass=1.0, inertia=1.0)
 STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
 
 
+def of_soil(numbers):
+    return lambda: ub.Potential("a", soil, numbers=numbers)
+
+
+def of_height(**more):
+    return ub.Potential("a", lambda q: q[0], **more)
+
+
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: ub.VirtualWork(3, air), ("VirtualWork: name = 3 must be text",)),
-        (lambda: ub.VirtualWork("", air), ("VirtualWork: name = ''",)),
+        (lambda: ub.Potential("kinetic", soil), ["'kinetic' is empty or a reserved entry"]),
+        (lambda: ub.Potential("a", min), ["Potential 'a'", "have no names"]),
+        (lambda: ub.Potential("a", lambda q, k: q[0]), ["a parameter 'k', which is unknown"]),
+        (lambda: ub.Potential("a", lambda w: w[0]), ["'w'", "the known ones are q, axis, t"]),
+        (of_soil({"k": 1, "n": 1}), ["Potential 'a': numbers['n'] is no parameter"]),
+        (of_soil({"k": 1, "q": 1}), ["numbers['q']: the name has a meaning"]),
+        (of_soil({"k": lambda t: None}), ["numbers['k']: the time function returned None"]),
+        (lambda: of_height(beams=[]), ["Potential 'a': beams is empty"]),
+        (lambda: ub.Scene(bodies=[BODY], works=[of_height()]), ["Potential 'a': there is no beam"]),
         (
-            lambda: ub.Potential("kinetic", soil),
-            ("'kinetic' is empty or a reserved entry",),
-        ),
-        (lambda: ub.Potential("a", 3), ("Potential 'a': density = 3 must be a function of q",)),
-        (lambda: ub.Potential("a", min), ("Potential 'a'", "have no names")),
-        (lambda: ub.Potential("a", lambda q, k: q[0]), ("a parameter 'k', which is unknown",)),
-        (lambda: ub.Potential("a", lambda w: w[0]), ("'w'", "the known ones are q, axis, t")),
-        (
-            lambda: ub.Potential("a", lambda q: q[0], numbers={"k": 1}),
-            ("Potential 'a': numbers['k'] is no parameter",),
-        ),
-        (
-            lambda: ub.Potential("a", lambda q: q[0], numbers={"q": 1}),
-            ("numbers['q']: the name has a meaning",),
+            lambda: ub.Scene([BEAM], works=[of_height(beams=[STRAY])]),
+            ["Potential 'a': stray is not in the scene; add it to beams"],
         ),
         (
-            lambda: ub.Potential("a", soil, numbers={"k": math.nan}),
-            ("Potential 'a': numbers['k'] = nan is not finite",),
+            lambda: ub.Scene([BEAM], works=[of_height(), of_height()]),
+            ["'a', the name of a work", "occurs twice, as works[0] and works[1]; rename one"],
         ),
-        (
-            lambda: ub.Potential("a", soil, numbers={"k": lambda t: None}),
-            ("numbers['k']: the time function returned None",),
-        ),
-        (lambda: ub.Potential("a", soil, numbers=3), ("numbers = 3 must be numbers by name",)),
-        (lambda: ub.Potential("a", lambda q: q[0], beams=3), ("beams = 3 must be a list",)),
-        (lambda: ub.Potential("a", lambda q: q[0], beams=[]), ("Potential 'a': beams is empty",)),
-        (
-            lambda: ub.Scene(bodies=[BODY], works=[ub.Potential("a", lambda q: q[0])]),
-            ("Potential 'a': there is no beam",),
-        ),
-        (lambda: ub.Potential("a", lambda q: q[0], beams=[3]), ("beams[0] = 3 is not a Beam",)),
-        (lambda: ub.Potential("a", lambda q: q[0], degree=0.5), ("degree = 0.5",)),
-        (
-            lambda: ub.Scene([BEAM], works=[ub.Potential("a", lambda q: q[0], beams=[STRAY])]),
-            ("Potential 'a': stray is not in the scene; add it to beams",),
-        ),
-        (
-            lambda: ub.Scene([BEAM], works=[ub.Potential("a", lambda q: q[0]) for _ in "ab"]),
-            (
-                "'a', the name of a work",
-                "occurs twice, as works[0] and works[1]; rename one",
-            ),
-        ),
-        (lambda: ub.Scene([BEAM], works=[soil]), ("works[0]", "is not a VirtualWork or Potential")),
-        (lambda: ub.Scene([BEAM], works=3), ("works = 3 must be a list",)),
+        (lambda: ub.Scene([BEAM], works=[soil]), ["works[0]", "is not a VirtualWork or Potential"]),
     ],
 )
 def test_bad_works_are_refused(make, says):
@@ -421,49 +264,27 @@ def other_mesh():
     return fem.Function(fem.functionspace(mesh, ("DG", 0, (3,))))
 
 
-def fail(**_):
-    return {}["nothing"]
-
-
 @pytest.mark.parametrize(
-    ("function", "says"),
+    ("kind", "function", "says"),
     [
-        (lambda w: None, "VirtualWork 'a': the function returned None"),
-        (lambda w: 3.0, "the function returned 3.0; it must return an expression of UFL"),
-        (lambda w: np.ones(2), "the function returned array"),
-        (lambda w: w, "the function returned a tensor of shape (3,)"),
-        (lambda w: fail(), "VirtualWork 'a': the function fails: KeyError('nothing')"),
-        (lambda q: q[0], "must return an expression that is linear in w"),
-        (lambda w: w[0] ** 2, "must return an expression that is linear in w"),
-        (lambda w: w[0] + 1, "must return an expression that is linear in w"),
-        (lambda w: abs(w[0]), "must return an expression that is linear in w"),
-        (lambda w: w[0] * other_mesh()[0], "the function uses a mesh of its own"),
+        (ub.VirtualWork, lambda w: None, "VirtualWork 'a': the function returned None"),
+        (ub.VirtualWork, lambda w: 3.0, "returned 3.0; it must return an expression of UFL"),
+        (ub.VirtualWork, lambda w: np.ones(2), "the function returned array"),
+        (ub.VirtualWork, lambda w: w, "the function returned a tensor of shape (3,)"),
+        (ub.VirtualWork, lambda w: {}["nothing"], "the function fails: KeyError('nothing')"),
+        (ub.VirtualWork, lambda q: q[0], "must return an expression that is linear in w"),
+        (ub.VirtualWork, lambda w: w[0] ** 2, "must return an expression that is linear in w"),
+        (ub.VirtualWork, lambda w: w[0] + 1, "must return an expression that is linear in w"),
+        (ub.VirtualWork, lambda w: abs(w[0]), "must return an expression that is linear in w"),
+        (ub.VirtualWork, lambda w: w[0] * other_mesh()[0], "the function uses a mesh of its own"),
+        (ub.Potential, lambda q: None, "Potential 'a': the function returned None"),
+        (ub.Potential, lambda t: 2 * t, "the energy must depend on the configuration q"),
+        (ub.Potential, lambda q: q, "the function returned a tensor of shape (3,)"),
+        (ub.Potential, lambda q: q.nothing, "the function fails: AttributeError"),
     ],
 )
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()])
-def test_bad_functions_of_virtual_works(function, says, scheme, monkeypatch):
-    def no_grid(*_):
-        raise AssertionError("a mesh")
-
-    monkeypatch.setattr("ufl_beam.simulation.initial_state.DofNumbering", no_grid)
-    held = [ub.Clamped(BEAM.start)]
-    scene = ub.Scene([BEAM], supports=held, works=[ub.VirtualWork("a", function)])
-    with raises(says):
-        ub.Simulation(scene, scheme)
-
-
-@pytest.mark.parametrize(
-    ("function", "says"),
-    [
-        (lambda q: None, "Potential 'a': the function returned None"),
-        (lambda t: 2 * t, "the energy must depend on the configuration q"),
-        (lambda q: q, "the function returned a tensor of shape (3,)"),
-        (lambda q: q.nothing, "the function fails: AttributeError"),
-    ],
-)
-def test_bad_functions_of_potentials(function, says):
-    held = [ub.Clamped(BEAM.start)]
-    scene = ub.Scene([BEAM], supports=held, works=[ub.Potential("a", function)])
+def test_bad_functions_are_refused(kind, function, says):
+    scene = clamped(BEAM, works=[kind("a", function)])
     with raises(says):
         ub.Simulation(scene, ub.EnergyMomentum())
 
