@@ -20,10 +20,18 @@ from ufl_beam.model.checks import (
     require_kind,
     require_number,
     require_switch,
+    require_point,
     require_vector,
 )
 from ufl_beam.model.functions import Curve, Point, tangent_within
-from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
+from ufl_beam.model.records import (
+    NotNegative,
+    Record,
+    Text,
+    Vector,
+    VectorOfScene,
+    require_moment,
+)
 
 TOGETHER = 1e-9  # largest distance at which two places of a beam coincide, as a fraction of a cell
 
@@ -111,8 +119,7 @@ class Place:
     @property
     def point(self) -> Point:
         """Coordinates in the undeformed scene; m."""
-        x, y = self.beam.curve(self.s)
-        return float(x), float(y)
+        return tuple(map(float, self.beam.curve(self.s)))  # type: ignore[return-value]
 
     @property
     def direction(self) -> Point:
@@ -123,9 +130,9 @@ class Place:
             for low, high in pairwise(edges)
             if low <= self.s <= high
         ]
-        x, y = sum((side / math.hypot(*side) for side in sides), np.zeros(2))
-        length = math.hypot(x, y)
-        return float(x / length), float(y / length)
+        first, *others = (side / math.hypot(*side) for side in sides)
+        whole = sum(others, first)
+        return tuple(map(float, whole / math.hypot(*whole)))  # type: ignore[return-value]
 
     def __str__(self) -> str:
         ends = {0.0: "start", 1.0: "end"}
@@ -246,7 +253,7 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
 
     for group in groups:
         indices = [
-            3 * number.setdefault(moved, len(number)) + component for moved, component in group
+            6 * number.setdefault(moved, len(number)) + component for moved, component in group
         ]
         dofs.update(zip(indices, group, strict=True))
         for x in indices[1:]:
@@ -273,14 +280,14 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     """
     if node(place) is GROUND or (point is None and isinstance(place, Place)):
         return 0.0, 0.0
-    x, y = point or place.point
-    nx, ny = place.body.center if isinstance(place, BodyPoint) else place.point
-    return x - nx, y - ny
+    at = point or place.point
+    of_node = place.body.center if isinstance(place, BodyPoint) else place.point
+    return tuple(x - n for x, n in zip(at, of_node, strict=True))  # type: ignore[return-value]
 
 
 def moves_with_node(place: AttachmentPoint) -> bool:
     """Return whether a place always has the displacement of its node."""
-    return arm(place) == (0.0, 0.0)
+    return not any(arm(place))
 
 
 def require_place(place: Any, what: str) -> None:
@@ -346,7 +353,7 @@ class Velocity(Record):
     Args:
         beams: The beams and bodies with this velocity.
         linear: Velocity of the point ``about``; m/s.
-        angular: Angular velocity; rad/s.
+        angular: Angular velocity, in space a vector; rad/s.
         about: Point of the undeformed scene, by default the origin; m.
 
     Example:
@@ -356,16 +363,19 @@ class Velocity(Record):
     """
 
     beams: Annotated[tuple[Member | Body, ...], partial(require_all, kind=(Member, Body))]
-    linear: Vector = (0.0, 0.0)
-    angular: Number = 0.0
-    about: Annotated[Point | None, require_vector] = None
+    linear: VectorOfScene = (0.0, 0.0)
+    angular: Annotated[Any, require_moment] = 0.0
+    about: Annotated[Any, require_point] = None
 
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""
         return map(base_of, self.beams)
 
-    def at(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
+    def at(self, x: float, y: float, *z: float) -> tuple[float, ...]:
+        """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s; in space six rates."""
+        if z:
+            arm = np.array([x, y, *z]) - (self.about or (0.0, 0.0, 0.0))
+            return *(np.array(self.linear) + np.cross(self.angular, arm)), *self.angular
         about_x, about_y = self.about or (0.0, 0.0)
         return (
             self.linear[0] - self.angular * (y - about_y),

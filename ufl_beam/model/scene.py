@@ -35,10 +35,12 @@ from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.joints import Joint
+from ufl_beam.model.joints import Joint, Rigid
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
+    Gravity,
+    LineLoad,
     Load,
     LoadAtPlace,
     MovingLoad,
@@ -46,7 +48,7 @@ from ufl_beam.model.loads import (
     RotatingFrame,
 )
 from ufl_beam.model.records import Record
-from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.model.supports import COMPONENTS, Clamped, Pinned, Support
 from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
 
 
@@ -101,6 +103,7 @@ class Scene(Record, Rich):
         super().__post_init__()
         if not self.beams and not self.bodies:
             raise ModelError("Scene: no beams and no bodies")
+        self._require_one_dimension()
         if GROUND in self.bodies:
             raise ModelError("Scene: the ground is in every scene; leave it out of bodies")
         for work in self.works if not self.beams else ():
@@ -162,6 +165,35 @@ class Scene(Record, Rich):
         return f"<Scene: {self}>"
 
     @property
+    def in_space(self) -> bool:
+        """True if points of the scene have three coordinates."""
+        return any(len(beam.ends[0]) == 3 for beam in self.beams)
+
+    def _require_one_dimension(self) -> None:
+        """Raise unless all vectors have two components, or three in a scene of known kinds."""
+        d = 3 if self.in_space else 2
+        kind = "in space, so that its vectors have three" if d == 3 else "in the plane, so that its vectors have two"
+        for beam in self.beams:
+            if len(beam.ends[0]) != d:
+                raise ModelError(
+                    f"{beam.name}: its ends have two coordinates, but {self.beams[0].name} and "
+                    "others are in space; give all points three coordinates"
+                )
+        for record in (*self.loads, *self.initial):
+            vectors = {x: getattr(record, x, None) for x in ("force", "acceleration", "linear", "about")}
+            if d == 3:
+                vectors |= {x: getattr(record, x) for x in ("moment", "angular") if np.any(getattr(record, x, 0))}
+            elif np.ndim(getattr(record, "moment", 0)) or np.ndim(getattr(record, "angular", 0)):
+                raise ModelError(f"{record._label()}: a moment in the plane is a number, not a vector")
+            for name, vector in vectors.items():
+                if vector is not None and np.size(vector) != d and np.any(vector):
+                    raise ModelError(
+                        f"{record._label()}: {name} = {vector}, but the scene is {kind} components"
+                    )
+        if d == 3:
+            require_space(self)
+
+    @property
     def parts(self) -> list[Beam | Body]:
         """The beams, then the bodies."""
         return [*self.beams, *self.bodies]
@@ -179,7 +211,7 @@ class Scene(Record, Rich):
         on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
         others = [body.center for body in self.bodies]
         others += [place.point for _, place in self.attachments() if isinstance(place, BodyPoint)]
-        points = np.concatenate([on_beams, np.reshape(others, (-1, 2))])
+        points = np.concatenate([on_beams, np.reshape(others, (-1, on_beams.shape[1]))])
         gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
         return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
 
@@ -341,6 +373,34 @@ class Scene(Record, Rich):
                         f"{COMPONENTS[component]}; remove one"
                     )
                 holders[dof] = str(support)
+
+
+IN_SPACE = (Beam, Rigid, Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity)
+"""Classes of the objects of scenes in space."""
+
+
+def require_space(scene: Scene) -> None:
+    """Raise :class:`ModelError` unless all objects of a scene have a counterpart in space."""
+    lists = "joints", "supports", "loads", "masses", "initial", "damping", "bodies", "connectors", "works"
+    for record in (x for name in lists for x in getattr(scene, name)):
+        if not isinstance(record, IN_SPACE) or getattr(record, "multipliers", False):
+            raise ModelError(
+                f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in space have "
+                f"{', '.join(x.__name__ for x in IN_SPACE)}"
+            )
+    for beam in scene.beams:
+        section = beam.section
+        missing = [x for x in ("GA3", "EI2", "GJ") if getattr(section, x) is None]
+        if missing:
+            raise ModelError(
+                f"{beam.name}: its section has no {', '.join(missing)}, the stiffnesses of a beam in "
+                "space; give Section(GA3=, EI2=, GJ=), or Section.rectangle, circle or tube"
+            )
+        if beam.hinges or section.section_points(section.hinge):
+            raise ModelError(
+                f"{beam.name}: inelastic laws and hinges are for scenes in the plane; beams in "
+                "space are elastic"
+            )
 
 
 def not_in(scene: Scene, member: Member | Body) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.cell_functions import mass_matrix, strains_of
+from ufl_beam.discretization.cells_in_space import TURNS, turns_at
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -280,6 +281,9 @@ class States:
     def displacement(self, place: AttachmentPoint) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
+        In space, return the displacement (u, v, w) and the rotation vector, of an angle up to π;
+        (n+1, 6).
+
         Between the nodes of a beam, values are interpolated with the degree of the cells.  In
         bodies, values are exact.
 
@@ -287,6 +291,8 @@ class States:
             ArgumentError: The beam or body of the place is not in the scene.
         """
         motion = values_at(self.numbering, place, self.column("q"))
+        if self.scene.in_space and isinstance(place, Place):
+            motion[:, 3:] = turns_at(self.numbering, place, self.column(TURNS)).as_rotvec()
         if isinstance(place, BodyPoint):
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
@@ -302,16 +308,17 @@ class States:
         return velocity_at(self.numbering, place, self.column("q"), v)
 
     def position(self, place: AttachmentPoint) -> Array:
-        """Return the coordinates of a place in the deformed scene; (n+1, 2); m."""
+        """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""
         if isinstance(place, BodyPoint):
             return np.asarray(place.point + self.displacement(place)[:, :2])
         nodes, weights = self.numbering.weights(place)
-        return np.asarray(weights @ self.numbering.points[nodes] + self.displacement(place)[:, :2])
+        u = self.displacement(place)[:, : self.numbering.displacements]
+        return np.asarray(weights @ self.numbering.points[nodes] + u)
 
     def shape(self, beam: Member, n: int = -1) -> Array:
-        """Return the deformed vertices of a beam at the n-th time; (num_vertices, 2); m."""
+        """Return the deformed vertices of a beam at the n-th time; (num_vertices, 2 or 3); m."""
         vertices, numbering = self.numbering.vertices_of(beam), self.numbering
-        moved = self._row("q", n)[numbering.dofs[vertices, :2]]
+        moved = self._row("q", n)[numbering.dofs[vertices, : numbering.displacements]]
         return np.asarray(numbering.points[vertices] + moved)
 
     # -- joints --------------------------------------------------------------------------------

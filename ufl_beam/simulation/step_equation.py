@@ -21,6 +21,7 @@ from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosi
 from ufl_beam.blocks.effect_blocks import EffectBlock
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
+from ufl_beam.blocks.spatial_beams import CellsInSpace, StatementInSpace, dead_moments
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -121,7 +122,11 @@ class StepEquation:
         if scene.beams:
             ledger.state["stored"] += 0.0
         subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
-        if elastic.any():
+        self.in_space: list[Block] = []
+        if scene.in_space:
+            self.in_space = [CellsInSpace(fields, in_blocks)]
+            self.loads += dead_moments(in_blocks)
+        elif elastic.any():
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
@@ -140,7 +145,7 @@ class StepEquation:
                     others += tangent_damping(damping, subset, self.inelastic, in_blocks)
             else:
                 others.append(viscosity(damping, fields, in_blocks))
-        self.inner: list[Term] = [*self.beams, *self.connector_terms]
+        self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
         self.imposed = [x for x in self.beams if x.imposed]
@@ -206,7 +211,7 @@ class StepEquation:
         archive = Archive(self.subdomain)
         prediction.save_or_restore(archive)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.connector_terms):
+        for term in (*self.inelastic, *self.in_space, *self.connector_terms):
             term.save_or_restore(archive, q)
         friction = any(
             has_friction(connector.law)
@@ -219,7 +224,7 @@ class StepEquation:
             self._pass_on_step(archive, q)
         for load in self.loads:
             load.pass_on(archive)
-            if isinstance(load, EffectBlock):
+            if isinstance(load, EffectBlock) or _turns(load):
                 load.keep_states(archive)
         return archive.state()
 
@@ -238,11 +243,11 @@ class StepEquation:
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.connector_terms):
-            term.save_or_restore(archive, NOWHERE)
+        for term in (*self.inelastic, *self.in_space, *self.connector_terms):
+            term.save_or_restore(archive, NOWHERE if term not in self.in_space else q)
         unknown = archive.unknown.copy()
         for load in self.loads:
-            if isinstance(load, EffectBlock):
+            if isinstance(load, EffectBlock) or _turns(load):
                 load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
@@ -424,6 +429,11 @@ class StepEquation:
             work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
             work += np.triu(work, 1).T
         return works[0], works[1]
+
+
+def _turns(load: LoadTerm) -> bool:
+    """Return whether a load remembers the rotation of its node."""
+    return isinstance(load, Block) and isinstance(load.statement, StatementInSpace)
 
 
 def equation_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> StepEquation:
