@@ -22,7 +22,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.beams import alike
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
-from ufl_beam.compiled.c_library import loop
+from ufl_beam.compiled.c_library import fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import cell_axes, quaternions, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
@@ -106,11 +106,18 @@ class ElasticCellInSpace(StatementInSpace):
     """
 
     nodes = 2
+    inserts = True
 
     @property
     def rates(self) -> int:
         """Velocities in dynamics."""
         return int(has_inertia(self.scheme))
+
+    @property
+    def modes(self) -> list[str]:
+        """In statics: motions at the latest tangent, as of :class:`~ufl_beam.blocks.beams.BeamCell`."""
+        at_rest = [*(f"about {x}" for x in self.unknowns), "moved", "reached"]
+        return [] if has_inertia(self.scheme) else at_rest
 
     @property
     def numbers(self) -> list[str]:
@@ -131,20 +138,22 @@ class ElasticCellInSpace(StatementInSpace):
         h, axes = at["h"], tuple(at[f"R{i}"] for i in range(4))
         into, t = matrix(axes), tuple(at[f"t{i}"] for i in range(3))
         q0 = [product(self.quaternion(at, k), axes) for k in (0, 1)]
-        own = [transposed_times(into, self.change(at, "abc", k)) for k in (0, 1)]
-        turns = [Turn(at.stage, tuple(map(at.stage, m)), q) for m, q in zip(own, q0, strict=True)]
+        rotations = [transposed_times(into, self.change(at, "abc", k)) for k in (0, 1)]
+        rotations = [tuple(map(at.stage, m)) for m in rotations]
+        turns = [Turn(at.stage, m, q) for m, q in zip(rotations, q0, strict=True)]
         u = [[self.vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
         slopes = [
             tuple(map(at.stage, add(t, scale(1 / h, subtract(b, a))))) for a, b in u
         ]
         old, now = Middle(at.stage, *q0), Middle(at.stage, *(turn.q1 for turn in turns))
-        e0, e1 = (self._strains(at, *pair, h) for pair in zip((old, now), slopes, strict=True))
-        C = ufl.as_vector([at[name] for name in STIFFNESS])
-        resultants = list[Expr]()
-        for i in (0, 3):
-            c, some = ufl.as_vector([C[i + k] for k in range(3)]), (e0[i : i + 3], e1[i : i + 3])
-            r = self.scheme.resultants(c, *map(ufl.as_vector, some), lambda _: at["alpha"])
-            resultants += [at.stage(r[k]) for k in range(3)]
+        e0, e1 = (
+            tuple(map(at.stage, _strains(*pair, h))) for pair in zip((old, now), slopes, strict=True)
+        )
+        C = [at[name] for name in STIFFNESS]
+        own, predicted = self._resultants(at, C, e0, e1), [None] * 6
+        if not self.rates:
+            predicted = self._resultants(at, C, e0, self._predicted(at, q0, u[0], t, into))
+        resultants = [at.stage(r, in_tangent=x) for r, x in zip(own, predicted, strict=True)]
         pair: Any = turns
         if acts_at_end(self.scheme):
             old, slopes = now, [slopes[1]] * 2
@@ -152,9 +161,10 @@ class ElasticCellInSpace(StatementInSpace):
         N, *moments = forces_over_step(
             at.stage, pair, (old, now), slopes, h, (resultants[:3], resultants[3:])
         )
-        on_nodes = [turn.on_node(x) for turn, x in zip(turns, moments, strict=True)]
+        at_end = acts_at_end(self.scheme)
+        on_nodes = [x.on_node(M, at_end=at_end) for x, M in zip(turns, moments, strict=True)]
         if self.rates:
-            on_nodes = [add(x, y) for x, y in zip(on_nodes, self._turning(at, own), strict=True)]
+            on_nodes = [add(x, y) for x, y in zip(on_nodes, self._turning(at, rotations), strict=True)]
         on_nodes = [times(into, x) for x in on_nodes]
         forces = [x for i in range(3) for x in (-N[i], N[i])]
         forces += [x for pair in zip(*on_nodes, strict=True) for x in pair]
@@ -164,10 +174,30 @@ class ElasticCellInSpace(StatementInSpace):
         back = (axes[0], *(-x for x in axes[1:]))
         return Equations(forces, self.new_state(turns, back), {"stored": stored}, lost)
 
-    def _strains(self, at: Inputs, middle: Middle, slope: Vector, h: Expr) -> Vector:
-        stretch, *shear = transposed_times(middle.frame, slope)
-        curvature = scale(1 / h, middle.rotation_vector)
-        return tuple(map(at.stage, (stretch - 1.0, *shear, *curvature)))
+    def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
+        found = list[Expr]()
+        for some in (slice(0, 3), slice(3, 6)):
+            vectors = (ufl.as_vector(x[some]) for x in (C, e0, e1))
+            r = self.scheme.resultants(*vectors, lambda _: at["alpha"])
+            found += [r[k] for k in range(3)]
+        return found
+
+    def _predicted(
+        self, at: Inputs, q0: Sequence[Vector], u0: Sequence[Vector], t: Vector, into: Any
+    ) -> Vector:
+        """Return the strains that the latest tangent predicts."""
+        along, turns, u = ufl.variable(ufl.as_ufl(0.0)), list[Turn](), list[Vector]()
+        for k in (0, 1):
+            last, change = (
+                subtract(self.vector(at, group, "xyzabc", k), self.vector(at, before, "xyzabc", k))
+                for group, before in (("about", "q0"), ("q1", "about"))
+            )
+            moved = add(last, scale(along, change))
+            u.append(add(u0[k], moved[:3]))
+            turns.append(Turn(_same, transposed_times(into, moved[3:]), q0[k]))
+        slope = add(t, scale(1 / at["h"], subtract(u[1], u[0])))
+        e = _strains(Middle(_same, *(turn.q1 for turn in turns)), slope, at["h"])
+        return tuple(x + at["moved"] * ufl.diff(x, along) for x in e)
 
     def _turning(self, at: Inputs, own: Sequence[Vector]) -> list[Vector]:
         """Return the moments by which the momenta of the nodes turn, in axes of the cell."""
@@ -187,6 +217,16 @@ class ElasticCellInSpace(StatementInSpace):
         return found
 
 
+def _same(x: Expr) -> Expr:
+    return x
+
+
+def _strains(middle: Middle, slope: Vector, h: Expr) -> Vector:
+    """Return the strains along, and curvatures about, the axes 1, 2, 3 of a cell."""
+    stretch, *shear = transposed_times(middle.frame, slope)
+    return (stretch - 1.0, *shear, *scale(1 / h, middle.rotation_vector))
+
+
 class CellsInSpace(Block):
     """Elastic cells of beams in space."""
 
@@ -199,11 +239,16 @@ class CellsInSpace(Block):
         if has_inertia(scheme):
             numbers += [*rotary_inertia(fields).T]
         cells = fields.subdomain.cells[fields.order]
-        elements = Elements("cells in space", cells, fields.cell_dofs, numbers)
-        super().__init__(
-            ElasticCellInSpace(alike(scheme)), elements, setting, kind="connectors"
-        )
-        self.kind = "beams"
+        elements = Elements(
+            "cells in space", cells, fields.cell_dofs, numbers, cells=fields.order,
+            force_kind=lib.STRESS,
+        )  # fmt: skip
+        super().__init__(ElasticCellInSpace(alike(scheme)), elements, setting, kind="beams")
+        self.in_cells, self.prediction = [], None
+        if not has_inertia(scheme):
+            self.prediction = struct("predicted_forces")
+            fill(self._c, predicted=self.prediction)
+            self.loops = self.loops[0], loop("add_predicted_tangent", self._c)
 
     def turns(self, of_vertices: Index) -> Index:
         """Return the places in the states of the quaternions of vertices; (num_vertices, 4)."""
@@ -219,7 +264,7 @@ class CellsInSpace(Block):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """See the base class."""
-        return super().phases(callbacks)._replace(change=loop("change_of_block", self._c))
+        return super().phases(callbacks)._replace(change=loop("change_of_cells", self._c))
 
 
 @dataclass(frozen=True)
@@ -234,7 +279,7 @@ class DeadMoment(StatementInSpace):
         """See the base class."""
         turn = Turn(at.stage, self.change(at, "abc", 0), self.quaternion(at, 0))
         M = scale(at["factor"], tuple(at[f"m{i}"] for i in range(3)))
-        forces = [ufl.as_ufl(0.0)] * 3 + [-x for x in turn.on_node(M)]
+        forces = [ufl.as_ufl(0.0)] * 3 + [-x for x in turn.on_node(M, at_end=acts_at_end(self.scheme))]
         return Equations(forces, self.new_state([turn]))
 
 

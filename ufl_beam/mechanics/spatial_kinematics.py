@@ -94,6 +94,7 @@ class Turn:
     """Rotation of a node in a step.
 
     Attributes:
+        m: Cayley vector in axes of the node.
         q0, q1: Quaternions before and after the step.
         c: Cosine of half the angle.
         s: Cayley vector in axes of the scene.
@@ -101,7 +102,7 @@ class Turn:
     """
 
     def __init__(self, stage: Callable[[Any], Any], m: Vector, q0: Vector) -> None:
-        self.q0, self.frame = q0, matrix(q0)
+        self.m, self.q0, self.frame = m, q0, matrix(q0)
         v = scale(0.5, m)
         self.c = stage(1 / ufl.sqrt(1 + dot(v, v)))
         turned = product(q0, (ufl.as_ufl(1.0), *v))
@@ -113,9 +114,12 @@ class Turn:
         """The quaternion after the step without round-off of its length."""
         return scale(1.5 - 0.5 * dot(self.q1, self.q1), self.q1)
 
-    def on_node(self, moment: Vector) -> Vector:
-        """Return the moment that works on the unknowns of the node, in axes of the node."""
-        return transposed_times(self.frame, moment)
+    def on_node(self, moment: Vector, *, at_end: bool = False) -> Vector:
+        """Return the moment that works on m over the step, or on a change of m ``at_end``."""
+        on_step = transposed_times(self.frame, moment)
+        if not at_end:
+            return on_step
+        return scale(self.c * self.c, add(on_step, scale(0.5, cross(on_step, self.m))))
 
 
 class Middle:

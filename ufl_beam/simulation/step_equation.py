@@ -122,7 +122,7 @@ class StepEquation:
         if scene.beams:
             ledger.state["stored"] += 0.0
         subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
-        self.in_space: list[Block] = []
+        self.in_space: list[CellsInSpace] = []
         if scene.in_space:
             self.in_space = [CellsInSpace(fields, in_blocks)]
             self.loads += dead_moments(in_blocks)
@@ -173,7 +173,7 @@ class StepEquation:
         product, cells = pop("add_step_tangent"), pop("add_cells")
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
-        predicted = [x for x in (term.prediction for term in self.beams) if x is not None]
+        predicted = [x.prediction for x in (*self.beams, *self.in_space) if x.prediction is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -292,7 +292,7 @@ class StepEquation:
                     begin(data, c, ffi.NULL, ffi.NULL)
             for beams in imposed:
                 beams.impose(c)
-        for beams in self.beams:
+        for beams in (*self.beams, *self.in_space):
             if beams in some and (predicted := beams.prediction) is not None:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
