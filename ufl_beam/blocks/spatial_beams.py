@@ -19,8 +19,8 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.beams import alike
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH
@@ -93,7 +93,8 @@ class StatementInSpace(Statement):
         found = dict[str, Expr]()
         for k, turn in enumerate(turns):
             q = turn.normal if to_node is None else product(turn.normal, to_node)
-            found |= {f"{c} of {k}": x for c, x in zip(QUATERNION, (q[0] - 1.0, *q[1:]), strict=True)}
+            names = (f"{c} of {k}" for c in QUATERNION)
+            found |= zip(names, (q[0] - 1.0, *q[1:]), strict=True)
         return found
 
 
@@ -115,7 +116,7 @@ class ElasticCellInSpace(StatementInSpace):
 
     @property
     def modes(self) -> list[str]:
-        """In statics: motions at the latest tangent, as of :class:`~ufl_beam.blocks.beams.BeamCell`."""
+        """In statics the same as of :class:`~ufl_beam.blocks.beams.BeamCell`."""
         at_rest = [*(f"about {x}" for x in self.unknowns), "moved", "reached"]
         return [] if has_inertia(self.scheme) else at_rest
 
@@ -142,12 +143,11 @@ class ElasticCellInSpace(StatementInSpace):
         rotations = [tuple(map(at.stage, m)) for m in rotations]
         turns = [Turn(at.stage, m, q) for m, q in zip(rotations, q0, strict=True)]
         u = [[self.vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
-        slopes = [
-            tuple(map(at.stage, add(t, scale(1 / h, subtract(b, a))))) for a, b in u
-        ]
+        slopes = [tuple(map(at.stage, add(t, scale(1 / h, subtract(b, a))))) for a, b in u]
         old, now = Middle(at.stage, *q0), Middle(at.stage, *(turn.q1 for turn in turns))
         e0, e1 = (
-            tuple(map(at.stage, _strains(*pair, h))) for pair in zip((old, now), slopes, strict=True)
+            tuple(map(at.stage, _strains(*pair, h)))
+            for pair in zip((old, now), slopes, strict=True)
         )
         C = [at[name] for name in STIFFNESS]
         own, predicted = self._resultants(at, C, e0, e1), [None] * 6
@@ -164,7 +164,9 @@ class ElasticCellInSpace(StatementInSpace):
         at_end = acts_at_end(self.scheme)
         on_nodes = [x.on_node(M, at_end=at_end) for x, M in zip(turns, moments, strict=True)]
         if self.rates:
-            on_nodes = [add(x, y) for x, y in zip(on_nodes, self._turning(at, rotations), strict=True)]
+            on_nodes = [
+                add(x, y) for x, y in zip(on_nodes, self._turning(at, rotations), strict=True)
+            ]
         on_nodes = [times(into, x) for x in on_nodes]
         forces = [x for i in range(3) for x in (-N[i], N[i])]
         forces += [x for pair in zip(*on_nodes, strict=True) for x in pair]
@@ -177,8 +179,8 @@ class ElasticCellInSpace(StatementInSpace):
     def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
         found = list[Expr]()
         for some in (slice(0, 3), slice(3, 6)):
-            vectors = (ufl.as_vector(x[some]) for x in (C, e0, e1))
-            r = self.scheme.resultants(*vectors, lambda _: at["alpha"])
+            c, before, now = (ufl.as_vector(x[some]) for x in (C, e0, e1))
+            r = self.scheme.resultants(c, before, now, lambda _: at["alpha"])
             found += [r[k] for k in range(3)]
         return found
 
@@ -279,8 +281,16 @@ class DeadMoment(StatementInSpace):
         """See the base class."""
         turn = Turn(at.stage, self.change(at, "abc", 0), self.quaternion(at, 0))
         M = scale(at["factor"], tuple(at[f"m{i}"] for i in range(3)))
-        forces = [ufl.as_ufl(0.0)] * 3 + [-x for x in turn.on_node(M, at_end=acts_at_end(self.scheme))]
+        forces = [ufl.as_ufl(0.0)] * 3 + [
+            -x for x in turn.on_node(M, at_end=acts_at_end(self.scheme))
+        ]
         return Equations(forces, self.new_state([turn]))
+
+
+class DeadMoments(Block):
+    """Moments at nodes, whose rotations are states."""
+
+    remembers = True
 
 
 def dead_moments(setting: BlockSetting) -> list[Block]:
@@ -293,4 +303,4 @@ def dead_moments(setting: BlockSetting) -> list[Block]:
     moments, mine = np.array([load.moment for load in loads], float), np.arange(len(loads))
     in_time = [InTime(load.amplitude, load) for load in loads]
     elements = Elements("dead moments", mine, nodes, [*moments.T], in_time, {"factor": mine})
-    return [Block(DeadMoment(setting.scheme), elements, setting, supplies="loads")]
+    return [DeadMoments(DeadMoment(setting.scheme), elements, setting, supplies="loads")]

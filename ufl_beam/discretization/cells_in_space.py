@@ -63,7 +63,7 @@ def turns_at(numbering: DofNumbering, place: Place, turns: Vectors) -> Rotation:
 
 
 def _rotations(turns: Array) -> Rotation:
-    return Rotation.from_quat(np.roll(turns + [1.0, 0.0, 0.0, 0.0], -1, axis=1))
+    return Rotation.from_quat(np.roll(turns + np.eye(4)[0], -1, axis=1))
 
 
 def of_vertices(numbering: DofNumbering) -> Index:

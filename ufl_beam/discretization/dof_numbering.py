@@ -40,7 +40,6 @@ from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.works import Effect
 
-
 IN_SPACE = "u", "v", "w", "rotation about x", "rotation about y", "rotation about z"
 """Names of the degrees of freedom of a node in space; its axes turn with it."""
 
@@ -64,6 +63,8 @@ class DofNumbering:
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of ``scene.rigid_bodies``; shape (num_bodies, 3).
         multipliers: Numbers of the forces of connectors (Lagrange multipliers); (num_connectors,).
+        displacements, width: Numbers of displacements and of degrees of freedom of a node: 2 and 3
+            in the plane, 3 and 6 in space.
         size: Number of degrees of freedom, including the forces of connectors.
         cells_at_hinges: Cell at each plastic hinge of zero length; shape (num_hinges,).
         vertices_at_hinges: First vertex at each of these hinges; shape (num_hinges,).
@@ -76,9 +77,9 @@ class DofNumbering:
         self.scene, self.mesh, beams = scene, mesh, scene.beams
         if scene.in_space and (mesh.degree, mesh.lumped) != (1, False):
             raise ModelError(
-                f"{mesh!r}: cells of beams in space have degree 1 and a consistent mass; refine them"
+                f"{mesh!r}: cells of beams in space have degree 1 and a consistent mass; give "
+                "more of them"
             )
-        #: Numbers of displacements and of degrees of freedom of a node
         self.displacements, self.width = (3, 6) if scene.in_space else (2, 3)
         self._beam_indices: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
         self._parameters: list[Array] = []
@@ -423,7 +424,9 @@ class DofNumbering:
     def rotations(self) -> Index:
         """Rotational degrees of freedom, each once, ascending."""
         first = self.displacements
-        return np.unique(np.r_[self.dofs[:, first:].ravel(), self.dofs_of_bodies[:, first:].ravel()])
+        return np.unique(
+            np.r_[self.dofs[:, first:].ravel(), self.dofs_of_bodies[:, first:].ravel()]
+        )
 
     @property
     def scales(self) -> Array:

@@ -74,7 +74,10 @@ class Subdomain:
             owner[numbering.dofs[numbering.nodes_of_cells[cell_ranks == rank]]] = rank
         self.cells = np.flatnonzero(cell_ranks == comm.rank).astype(np.int32)
         cell_dofs = numbering.dofs[numbering.nodes_of_cells[self.cells]].transpose(0, 2, 1)
-        cell_dofs = cell_dofs.reshape(len(self.cells), -1 if len(self.cells) else numbering.width * (numbering.mesh.degree + 1))
+        cell_dofs = cell_dofs.reshape(
+            len(self.cells),
+            -1 if len(self.cells) else numbering.width * (numbering.mesh.degree + 1),
+        )
         hinge_dofs, hinge_cells = (
             numbering.dofs[numbering.vertices_at_hinges],
             numbering.cells_at_hinges,

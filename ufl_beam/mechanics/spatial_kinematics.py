@@ -161,8 +161,8 @@ def _divided(y0: Expr, y1: Expr) -> tuple[Any, Any, Any]:
 
 
 def forces_over_step(
-    stage: Callable[[Any], Any], turns: tuple[Turn, Turn], ends: tuple[Middle, Middle],
-    tangents: tuple[Vector, Vector], length: Expr, resultants: tuple[Vector, Vector],
+    stage: Callable[[Any], Any], turns: Sequence[Turn], ends: tuple[Middle, Middle],
+    tangents: Sequence[Vector], length: Expr, resultants: Sequence[Sequence[Any]],
 ) -> tuple[Vector, Vector, Vector]:  # fmt: skip
     """Return what resultants exert over a step: force on φ', and moments on both nodes.
 
@@ -178,7 +178,7 @@ def forces_over_step(
     def stages(x: Vector) -> Vector:
         return tuple(map(stage, x))
 
-    (A, B), (old, now), (n, m), h = turns, ends, resultants, length
+    (A, B), (old, now), (n, m), h = turns, ends, map(tuple, resultants), length
     N = stages(mean(times(old.frame, n), times(now.frame, n)))
     μ = stages(cross(N, mean(*tangents)))
     s, d = stages(mean(A.s, B.s)), stages(scale(0.5, subtract(B.s, A.s)))

@@ -58,8 +58,9 @@ class Beam(Record, Member):
             ``(0, 0, 1)``.
 
     Raises:
-        ModelError: Zero length, ``up`` along the beam, ``cells < 1``, coordinates that are not finite, corners or hinges
-            outside the beam, hinges with a section of fibres, or a curve that misses an end.
+        ModelError: Zero length, ``up`` along the beam, ``cells < 1``, coordinates that are not
+            finite, corners or hinges outside the beam, hinges with a section of fibres, or a curve
+            that misses an end.
 
     Example:
         >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
@@ -113,11 +114,10 @@ class Beam(Record, Member):
             at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
             points = [curve_point(self.curve, s, f"{self.name}: curve") for s in at]
             for s, point, end in zip((0, 1), (points[0], points[-1]), self.ends, strict=True):
-                if math.dist(point, end) > 1e-9 * max(math.hypot(*point), math.hypot(*end)):
+                size = max(math.hypot(*point), math.hypot(*end))
+                if len(point) != len(end) or math.dist(point, end) > 1e-9 * size:
                     raise ModelError(f"{self.name}: curve({s}) = {point} is not the end {end}")
             length = sum(math.dist(p, q) for p, q in pairwise(points))
-            if len(points[0]) != len(self.ends[0]):
-                raise ModelError(f"{self.name}: curve(0) = {points[0]} is not the end {self.ends[0]}")
         self._require_up()
         depth = self.section.depth
         if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is depth / sqrt(12)

@@ -19,8 +19,8 @@ from ufl_beam.model.checks import (
     require_all,
     require_kind,
     require_number,
-    require_switch,
     require_point,
+    require_switch,
     require_vector,
 )
 from ufl_beam.model.functions import Curve, Point, tangent_within

@@ -23,9 +23,9 @@ from ufl_beam.errors import ModelError, NoNumber, closed, shorten
 from ufl_beam.model.checks import (
     require_function,
     require_number,
+    require_point,
     require_returned,
     require_sequence,
-    require_point,
     require_vector,
 )
 
@@ -205,7 +205,7 @@ def curve_point(curve: Curve, s: float, what: str) -> Point:
         point = curve(s)
     except Exception as error:
         raise ModelError(f"{what}({s:g}) fails: {shorten(error)}") from error
-    return require_point(point, f"{what}({s:g})")
+    return require_point(point, f"{what}({s:g})")  # type: ignore[return-value]
 
 
 def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:

@@ -30,9 +30,9 @@ from ufl_beam.errors import (
     ModelError,
     require_kind,
     require_number,
+    require_point,
     require_switch,
     require_text,
-    require_point,
     require_vector,
 )
 
@@ -52,7 +52,6 @@ Text = Annotated[str, require_text]
 Switch = Annotated[bool, require_switch]
 Instance = Annotated[T, require_kind]
 """Type of a field with an object of the annotated class, or of one of several classes."""
-
 
 
 def require_moment(value: Any, what: str) -> float | tuple[float, ...]:

@@ -171,27 +171,30 @@ class Scene(Record, Rich):
 
     def _require_one_dimension(self) -> None:
         """Raise unless all vectors have two components, or three in a scene of known kinds."""
-        d = 3 if self.in_space else 2
-        kind = "in space, so that its vectors have three" if d == 3 else "in the plane, so that its vectors have two"
-        for beam in self.beams:
-            if len(beam.ends[0]) != d:
-                raise ModelError(
-                    f"{beam.name}: its ends have two coordinates, but {self.beams[0].name} and "
-                    "others are in space; give all points three coordinates"
-                )
-        for record in (*self.loads, *self.initial):
-            vectors = {x: getattr(record, x, None) for x in ("force", "acceleration", "linear", "about")}
-            if d == 3:
-                vectors |= {x: getattr(record, x) for x in ("moment", "angular") if np.any(getattr(record, x, 0))}
-            elif np.ndim(getattr(record, "moment", 0)) or np.ndim(getattr(record, "angular", 0)):
-                raise ModelError(f"{record._label()}: a moment in the plane is a number, not a vector")
-            for name, vector in vectors.items():
-                if vector is not None and np.size(vector) != d and np.any(vector):
+        d, of = (3, "in space") if self.in_space else (2, "in the plane")
+        for beam in (b for b in self.beams if len(b.ends[0]) != d):
+            raise ModelError(
+                f"{beam.name}: its ends have two coordinates, but other beams are in space; give "
+                "all points three coordinates"
+            )
+        names = "force", "acceleration", "linear", "about", "moment", "angular"
+        records: list[Record] = [*self.loads, *self.initial]
+        for record in records:
+            for name in names:
+                vector = getattr(record, name, None)
+                wanted = 1 if d == 2 and name in ("moment", "angular") else d
+                if vector is not None and np.any(vector) and np.size(vector) != wanted:
                     raise ModelError(
-                        f"{record._label()}: {name} = {vector}, but the scene is {kind} components"
+                        f"{record._label()}: {name} = {vector} must have {wanted} components, "
+                        f"because the scene is {of}"
                     )
         if d == 3:
             require_space(self)
+
+    def require_plane(self, what: str) -> None:
+        """Raise :class:`ModelError` if points of the scene have three coordinates."""
+        if self.in_space:
+            raise ModelError(f"{what}: only for scenes in the plane, so far; this one is in space")
 
     @property
     def parts(self) -> list[Beam | Body]:
@@ -381,19 +384,19 @@ IN_SPACE = (Beam, Rigid, Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity
 
 def require_space(scene: Scene) -> None:
     """Raise :class:`ModelError` unless all objects of a scene have a counterpart in space."""
-    lists = "joints", "supports", "loads", "masses", "initial", "damping", "bodies", "connectors", "works"
-    for record in (x for name in lists for x in getattr(scene, name)):
+    records: list[Any] = [*scene.joints, *scene.supports, *scene.loads, *scene.masses]
+    records += [*scene.initial, *scene.damping, *scene.bodies, *scene.connectors, *scene.works]
+    for record in records:
         if not isinstance(record, IN_SPACE) or getattr(record, "multipliers", False):
             raise ModelError(
-                f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in space have "
-                f"{', '.join(x.__name__ for x in IN_SPACE)}"
+                f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in "
+                f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
             )
     for beam in scene.beams:
         section = beam.section
-        missing = [x for x in ("GA3", "EI2", "GJ") if getattr(section, x) is None]
-        if missing:
+        if missing := [x for x in ("GA3", "EI2", "GJ") if getattr(section, x) is None]:
             raise ModelError(
-                f"{beam.name}: its section has no {', '.join(missing)}, the stiffnesses of a beam in "
+                f"{beam.name}: its section has no {', '.join(missing)}, stiffnesses of beams in "
                 "space; give Section(GA3=, EI2=, GJ=), or Section.rectangle, circle or tube"
             )
         if beam.hinges or section.section_points(section.hinge):

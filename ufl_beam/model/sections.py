@@ -37,7 +37,6 @@ from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 ResultantLaw = Annotated[MaterialLaw | None, require_law]
 
 
-
 def require_stiffness(value: float | None, what: str) -> None:
     """Raise :class:`ModelError` unless ``value`` is a positive number or None."""
     if value is not None:

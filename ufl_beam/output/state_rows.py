@@ -256,7 +256,8 @@ class StateWriter:
         constrained = [
             (numbering.node(support.place)[c], at["reactions"].start + numbering.width * k + c)
             for k, support in enumerate(numbering.scene.supports)
-            for held in support.held for c in numbering.components(held)
+            for held in support.held
+            for c in numbering.components(held)
         ]
         dofs, to = np.array(constrained, dtype=np.int64).reshape(-1, 2).T
         owned = subdomain.owns(dofs)
@@ -272,7 +273,9 @@ class StateWriter:
             self._add(self._place(term.points.recorded), first[:, None] + k, rows[:, None] + k)
         for cells in in_space:
             of_nodes = cells.turns(of_vertices(numbering)).ravel()
-            self._add(self._place(cells.states), of_nodes, at[TURNS].start + np.arange(of_nodes.size))
+            self._add(
+                self._place(cells.states), of_nodes, at[TURNS].start + np.arange(of_nodes.size)
+            )
         for connector in connector_terms:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices
             self._add(now, connector.forces_at, rows + FORCE)

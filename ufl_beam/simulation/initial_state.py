@@ -278,7 +278,8 @@ def _initial_velocity(numbering: DofNumbering) -> Array:
     parts: list[Any] = [b for b in scene.beams if b.section.rhoA or b.section.rhoI]
     parts += [b for b in scene.bodies if b.mass or b.inertia]
     given: list[tuple[Any, Any]] = [(part, x.at) for x in scene.initial for part in x.beams]
-    rest = [(part, lambda *_: np.zeros(numbering.width)) for part in parts if part not in dict(given)]
+    still = np.zeros(numbering.width)
+    rest = [(part, lambda *_: still) for part in parts if part not in dict(given)]
     for part, at in given + rest * bool(given):
         points, dofs = numbering.nodes_of(part)
         new = np.array([at(*point) for point in points])

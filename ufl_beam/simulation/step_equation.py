@@ -18,10 +18,9 @@ from ufl_beam.blocks.beams import BeamCells, InelasticCells, elastic_cells
 from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
-from ufl_beam.blocks.effect_blocks import EffectBlock
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
-from ufl_beam.blocks.spatial_beams import CellsInSpace, StatementInSpace, dead_moments
+from ufl_beam.blocks.spatial_beams import CellsInSpace, dead_moments
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -147,6 +146,7 @@ class StepEquation:
                 others.append(viscosity(damping, fields, in_blocks))
         self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
+        self._predicting: list[Any] = [*self.beams, *self.in_space]
         self.terms: list[Term] = [*self.inner, *self.others]
         self.imposed = [x for x in self.beams if x.imposed]
         self._fill_c(search, switched)
@@ -173,7 +173,7 @@ class StepEquation:
         product, cells = pop("add_step_tangent"), pop("add_cells")
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
-        predicted = [x.prediction for x in (*self.beams, *self.in_space) if x.prediction is not None]
+        predicted = [x.prediction for x in self._predicting if x.prediction is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -224,7 +224,7 @@ class StepEquation:
             self._pass_on_step(archive, q)
         for load in self.loads:
             load.pass_on(archive)
-            if isinstance(load, EffectBlock) or _turns(load):
+            if isinstance(load, Block) and load.remembers:
                 load.keep_states(archive)
         return archive.state()
 
@@ -247,7 +247,7 @@ class StepEquation:
             term.save_or_restore(archive, NOWHERE if term not in self.in_space else q)
         unknown = archive.unknown.copy()
         for load in self.loads:
-            if isinstance(load, EffectBlock) or _turns(load):
+            if isinstance(load, Block) and load.remembers:
                 load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
@@ -292,8 +292,8 @@ class StepEquation:
                     begin(data, c, ffi.NULL, ffi.NULL)
             for beams in imposed:
                 beams.impose(c)
-        for beams in (*self.beams, *self.in_space):
-            if beams in some and (predicted := beams.prediction) is not None:
+        for cells in self._predicting:
+            if cells in some and (predicted := cells.prediction) is not None:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
@@ -429,11 +429,6 @@ class StepEquation:
             work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
             work += np.triu(work, 1).T
         return works[0], works[1]
-
-
-def _turns(load: LoadTerm) -> bool:
-    """Return whether a load remembers the rotation of its node."""
-    return isinstance(load, Block) and isinstance(load.statement, StatementInSpace)
 
 
 def equation_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> StepEquation:
