@@ -1,17 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Statements of beams in space: elastic cells with the rotation of their mass, dead moments.
-
-A node has six unknowns: its displacement, and numbers whose change in a step is the Cayley vector
-of its rotation in axes of the node, see :mod:`ufl_beam.mechanics.spatial_kinematics`.  So rates of
-these numbers are angular velocities in axes of the node, the mass matrix is constant, and C needs
-no rotations.  Quaternions of nodes are states of the elements.
-"""
+"""Statements of beams in space: elastic cells with the rotation of their mass, dead moments."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,10 +14,24 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import alike
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.nodes_in_space import (
+    change,
+    new_state,
+    quaternion,
+    quaternion_names,
+    unknowns,
+    vector,
+)
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH
-from ufl_beam.discretization.cells_in_space import cell_axes, quaternions, rotary_inertia
+from ufl_beam.discretization.cells_in_space import (
+    cell_axes,
+    of_vertices,
+    quaternions,
+    rotary_inertia,
+)
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.spatial_kinematics import (
     Middle,
@@ -45,12 +52,6 @@ from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
 from ufl_beam.model.loads import PointLoad
 from ufl_beam.terms.term import Callbacks, Phases
 
-UNKNOWNS = "x", "y", "z", "a", "b", "c"
-"""Displacements along the axes of the scene, then rotations about axes of the node."""
-
-QUATERNION = "turn 0", "turn 1", "turn 2", "turn 3"
-"""Quaternion of a node; the first number is its real part minus 1, so that all begin with zero."""
-
 STIFFNESS = "EA", "GA", "GA3", "GJ", "EI2", "EI"
 """Stiffnesses for the strains along the axes 1, 2, 3 of a section, and the rotations about them."""
 
@@ -68,34 +69,12 @@ class StatementInSpace(Statement):
     @property
     def unknowns(self) -> list[str]:
         """Names of the unknowns of all nodes, component by component."""
-        return [f"{c}{k}" for c in UNKNOWNS for k in range(self.nodes)]
+        return unknowns(self.nodes)
 
     @property
     def state(self) -> list[str]:
         """Quaternions of the nodes."""
-        return [f"{c} of {k}" for k in range(self.nodes) for c in QUATERNION]
-
-    def vector(self, at: Inputs, group: str, names: str, k: int) -> Vector:
-        """Return three numbers of a node."""
-        return tuple(at[f"{group} {c}{k}"] for c in names)
-
-    def quaternion(self, at: Inputs, k: int) -> Vector:
-        """Return the quaternion of a node before the step."""
-        real, *vector = (at[f"{c} of {k}"] for c in QUATERNION)
-        return (1.0 + real, *vector)
-
-    def change(self, at: Inputs, names: str, k: int) -> Vector:
-        """Return the change of three unknowns in the step."""
-        return subtract(self.vector(at, "q1", names, k), self.vector(at, "q0", names, k))
-
-    def new_state(self, turns: Sequence[Turn], to_node: Vector | None = None) -> dict[str, Expr]:
-        """Return the quaternions after the step; ``to_node`` turns axes of elements into those."""
-        found = dict[str, Expr]()
-        for k, turn in enumerate(turns):
-            q = turn.normal if to_node is None else product(turn.normal, to_node)
-            names = (f"{c} of {k}" for c in QUATERNION)
-            found |= zip(names, (q[0] - 1.0, *q[1:]), strict=True)
-        return found
+        return [x for k in range(self.nodes) for x in quaternion_names(k)]
 
 
 @dataclass(frozen=True)
@@ -138,11 +117,11 @@ class ElasticCellInSpace(StatementInSpace):
         """See the base class."""
         h, axes = at["h"], tuple(at[f"R{i}"] for i in range(4))
         into, t = matrix(axes), tuple(at[f"t{i}"] for i in range(3))
-        q0 = [product(self.quaternion(at, k), axes) for k in (0, 1)]
-        rotations = [transposed_times(into, self.change(at, "abc", k)) for k in (0, 1)]
+        q0 = [product(quaternion(at, k), axes) for k in (0, 1)]
+        rotations = [transposed_times(into, change(at, "abc", k)) for k in (0, 1)]
         rotations = [tuple(map(at.stage, m)) for m in rotations]
         turns = [Turn(at.stage, m, q) for m, q in zip(rotations, q0, strict=True)]
-        u = [[self.vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
+        u = [[vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
         slopes = [tuple(map(at.stage, add(t, scale(1 / h, subtract(b, a))))) for a, b in u]
         old, now = Middle(at.stage, *q0), Middle(at.stage, *(turn.q1 for turn in turns))
         e0, e1 = (
@@ -157,7 +136,7 @@ class ElasticCellInSpace(StatementInSpace):
         pair: Any = turns
         if acts_at_end(self.scheme):
             old, slopes = now, [slopes[1]] * 2
-            pair = [SimpleNamespace(q0=x.q1, q1=x.q1, c=1.0, s=(0.0,) * 3) for x in turns]
+            pair = [turn.at_end for turn in turns]
         N, *moments = forces_over_step(
             at.stage, pair, (old, now), slopes, h, (resultants[:3], resultants[3:])
         )
@@ -171,10 +150,10 @@ class ElasticCellInSpace(StatementInSpace):
         forces = [x for i in range(3) for x in (-N[i], N[i])]
         forces += [x for pair in zip(*on_nodes, strict=True) for x in pair]
         stored = h / 2 * sum(C[i] * e1[i] ** 2 for i in range(6))
-        change = sum(C[i] * (e1[i] - e0[i]) ** 2 for i in range(6))
-        lost = {"numerical": at["alpha"] * h * change} if self.scheme.alpha else {}
+        growth = sum(C[i] * (e1[i] - e0[i]) ** 2 for i in range(6))
+        lost = {"numerical": at["alpha"] * h * growth} if self.scheme.alpha else {}
         back = (axes[0], *(-x for x in axes[1:]))
-        return Equations(forces, self.new_state(turns, back), {"stored": stored}, lost)
+        return Equations(forces, new_state(turns, back), {"stored": stored}, lost)
 
     def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
         found = list[Expr]()
@@ -190,11 +169,11 @@ class ElasticCellInSpace(StatementInSpace):
         """Return the strains that the latest tangent predicts."""
         along, turns, u = ufl.variable(ufl.as_ufl(0.0)), list[Turn](), list[Vector]()
         for k in (0, 1):
-            last, change = (
-                subtract(self.vector(at, group, "xyzabc", k), self.vector(at, before, "xyzabc", k))
+            last, further = (
+                subtract(vector(at, group, "xyzabc", k), vector(at, before, "xyzabc", k))
                 for group, before in (("about", "q0"), ("q1", "about"))
             )
-            moved = add(last, scale(along, change))
+            moved = add(last, scale(along, further))
             u.append(add(u0[k], moved[:3]))
             turns.append(Turn(_same, transposed_times(into, moved[3:]), q0[k]))
         slope = add(t, scale(1 / at["h"], subtract(u[1], u[0])))
@@ -206,16 +185,14 @@ class ElasticCellInSpace(StatementInSpace):
         into, J = matrix(tuple(at[f"R{i}"] for i in range(4))), [at[f"J{i}"] for i in (1, 2, 3)]
         momenta = list[Vector]()
         for k, m in enumerate(own):
-            before = transposed_times(into, self.vector(at, "rate1", "abc", k))
+            before = transposed_times(into, vector(at, "rate1", "abc", k))
             ω = add(scale(at["rates 0 0"], m), scale(at["rates 0 1"], before))
             momenta.append(tuple(j * x for j, x in zip(J, ω, strict=True)))
         found = list[Vector]()
         for k, m in enumerate(own):
             sums = add(scale(2.0, momenta[k]), momenta[1 - k])
             P = tuple(map(at.stage, scale(at["h"] / 6, sums)))
-            c2 = at.stage(1 / (1 + dot(m, m) / 4) / at["dt"])
-            first = cross(m, P)
-            found.append(scale(c2, add(first, scale(0.5, cross(m, first)))))
+            found.append(turned_momentum(m, P, at["dt"]))
         return found
 
 
@@ -252,12 +229,12 @@ class CellsInSpace(Block):
             fill(self._c, predicted=self.prediction)
             self.loops = self.loops[0], loop("add_predicted_tangent", self._c)
 
-    def turns(self, of_vertices: Index) -> Index:
-        """Return the places in the states of the quaternions of vertices; (num_vertices, 4)."""
-        cell, second = of_vertices.T[:, :, None]
+    def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
+        """Return the places in the states of the quaternions of vertices, and the vertices."""
+        cell, second = of_vertices(numbering).T[:, :, None]
         own = np.searchsorted(self._elements.indices, cell)
         row = own // BATCH * len(self.statement.state) + 4 * second + np.arange(4)
-        return np.asarray(row * BATCH + own % BATCH)
+        return np.asarray(row * BATCH + own % BATCH), np.arange(len(row))
 
     @property
     def states(self) -> Array:
@@ -279,12 +256,74 @@ class DeadMoment(StatementInSpace):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
-        turn = Turn(at.stage, self.change(at, "abc", 0), self.quaternion(at, 0))
+        turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
         M = scale(at["factor"], tuple(at[f"m{i}"] for i in range(3)))
         forces = [ufl.as_ufl(0.0)] * 3 + [
             -x for x in turn.on_node(M, at_end=acts_at_end(self.scheme))
         ]
-        return Equations(forces, self.new_state([turn]))
+        return Equations(forces, new_state([turn]))
+
+
+def turned_momentum(m: Vector, P: Vector, dt: Expr) -> Vector:
+    """Return the moment by which a momentum P in axes of a node turns in a step."""
+    first = cross(m, P)
+    return scale(1 / (1 + dot(m, m) / 4) / dt, add(first, scale(0.5, cross(m, first))))
+
+
+@dataclass(frozen=True)
+class TurningBody(StatementInSpace):
+    """Moment of the turning momentum of a body, besides its inertia; it has no power."""
+
+    nodes = 1
+    numbers = tuple(f"J{i}{j}" for i in range(3) for j in range(3))
+
+    @property
+    def rates(self) -> int:
+        """Velocities in dynamics."""
+        return int(has_inertia(self.scheme))
+
+    @property
+    def of_step(self) -> list[str]:
+        """Length of the step, and coefficients of its rates."""
+        return ["dt", "rates 0 0", "rates 0 1"] if self.rates else []
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class."""
+        m, none = change(at, "abc", 0), [ufl.as_ufl(0.0)] * 3
+        state = new_state([Turn(at.stage, m, quaternion(at, 0))])
+        if not self.rates:
+            return Equations([*none, *none], state)
+        before = vector(at, "rate1", "abc", 0)
+        ω = add(scale(at["rates 0 0"], m), scale(at["rates 0 1"], before))
+        P = tuple(sum(at[f"J{i}{j}"] * ω[j] for j in range(3)) for i in range(3))
+        return Equations([*none, *turned_momentum(m, P, at["dt"])], state)
+
+
+class BodiesInSpace(Block):
+    """Bodies, whose rotations are states."""
+
+    def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
+        """Return the places in the states of the quaternions of bodies, and their nodes."""
+        own = np.arange(len(self._elements.indices))
+        row = own[:, None] // BATCH * 4 + np.arange(4)
+        return row * BATCH + own[:, None] % BATCH, len(numbering.points) + own
+
+    @property
+    def states(self) -> Array:
+        """States of all bodies, in batches."""
+        return self._states
+
+
+def bodies_in_space(setting: BlockSetting) -> list[BodiesInSpace]:
+    """Return the block of the moving bodies, if there are any."""
+    subdomain, bodies = setting.subdomain, setting.scene.bodies
+    if not bodies:
+        return []
+    nodes = np.array([subdomain.local(subdomain.numbering.node(x.middle)) for x in bodies])
+    numbers = np.array([np.ravel(body.tensor) for body in bodies]).T
+    elements = Elements("bodies in space", np.arange(len(bodies)), nodes, [*numbers])
+    statement = TurningBody(setting.scheme)
+    return [BodiesInSpace(statement, elements, setting, kind="inertia of bodies")]
 
 
 class DeadMoments(Block):

@@ -10,7 +10,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors
 from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.model.bodies import Place
+from ufl_beam.model.bodies import AttachmentPoint, BodyPoint
 
 TURNS = "turns"
 """Column of a state with the quaternions of the nodes; the first number is the real part minus 1,
@@ -52,11 +52,19 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
     dofs = fields.cell_dofs
     rows, columns = (np.broadcast_to(x, cells.shape) for x in (dofs[:, :, None], dofs[:, None, :]))
     np.add.at(A.data, A.positions(rows.ravel(), columns.ravel()), cells.ravel())
+    for body in fields.subdomain.numbering.scene.bodies:
+        own = fields.subdomain.local(fields.subdomain.numbering.node(body.middle))
+        inertia = np.zeros((6, 6))
+        inertia[range(3), range(3)], inertia[3:, 3:] = body.mass, body.tensor
+        np.add.at(A.data, A.positions(np.repeat(own, 6), np.tile(own, 6)), inertia.ravel())
     return A
 
 
-def turns_at(numbering: DofNumbering, place: Place, turns: Vectors) -> Rotation:
-    """Return the rotations of the frame at a place; the column ``turns`` is (n, num_nodes, 4)."""
+def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) -> Rotation:
+    """Return the rotations of the frame at a place; the column ``turns`` is (n, nodes, 4)."""
+    if isinstance(place, BodyPoint):
+        body = numbering.scene.rigid_bodies.index(place.body)
+        return _rotations(turns[:, len(numbering.points) + body])
     nodes, weights = numbering.weights(place)
     a, b = (_rotations(turns[:, node]) for node in nodes)
     return a * Rotation.from_rotvec(weights[1] * (a.inv() * b).as_rotvec())

@@ -92,7 +92,8 @@ class DofNumbering:
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
-        vertices = points_along([beam.curve for beam in beams], self._parameters)
+        curves = [beam.curve for beam in beams]
+        vertices = points_along(curves, self._parameters, 3 if scene.in_space else 2)
         begins = np.ones(len(vertices), dtype=bool)
         begins[self.first_vertices[1:] - 1] = False
         begin = np.flatnonzero(begins)
@@ -403,7 +404,7 @@ class DofNumbering:
     def nodes_of(self, member: Member | Body) -> tuple[Array, Index]:
         """Return points (m) and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3)."""
         if isinstance(member, Body):
-            return np.array([member.center]), self.node(member.middle).reshape(1, 3)
+            return np.array([member.center]), self.node(member.middle)[None]
         nodes = self._beam_nodes(member)
         return self.points[nodes], self.dofs[nodes]
 
@@ -512,7 +513,7 @@ def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) 
     """Return values at the centre of a body, or interpolated at a place of a beam; (n, 3)."""
     if isinstance(place, BodyPoint):
         if node(place) is GROUND:
-            return np.zeros((len(states), 3))
+            return np.zeros((len(states), numbering.width))
         dofs = numbering.node(place)
         return np.ascontiguousarray(states[:, dofs])
     nodes, weights = numbering.weights(place)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import factorial
+from types import SimpleNamespace
 from typing import Any
 
 import ufl
@@ -113,6 +114,18 @@ class Turn:
     def normal(self) -> Vector:
         """The quaternion after the step without round-off of its length."""
         return scale(1.5 - 0.5 * dot(self.q1, self.q1), self.q1)
+
+    @property
+    def at_end(self) -> Any:
+        """The node at the end of the step, as a step without rotation."""
+        none = ufl.as_ufl(0.0)
+        return SimpleNamespace(q0=self.q1, q1=self.q1, c=ufl.as_ufl(1.0), s=(none, none, none))
+
+    def virtual_rotation(self, w: Vector, *, at_end: bool = False) -> Vector:
+        """Return the virtual rotation, in axes of the scene, of a virtual m; see on_node."""
+        if at_end:
+            w = scale(self.c * self.c, add(w, scale(0.5, cross(self.m, w))))
+        return times(self.frame, w)
 
     def on_node(self, moment: Vector, *, at_end: bool = False) -> Vector:
         """Return the moment that works on m over the step, or on a change of m ``at_end``."""

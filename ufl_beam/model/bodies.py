@@ -17,18 +17,17 @@ from ufl_beam.display import at_point, bracketed
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.checks import (
     require_all,
+    require_array,
     require_kind,
     require_number,
     require_point,
     require_switch,
-    require_vector,
 )
 from ufl_beam.model.functions import Curve, Point, tangent_within
 from ufl_beam.model.records import (
     NotNegative,
     Record,
     Text,
-    Vector,
     VectorOfScene,
     require_moment,
 )
@@ -140,6 +139,23 @@ class Place:
         return f"{name} beyond the hinge" if self.beyond else name
 
 
+def require_inertia_of_body(value: Any, what: str) -> Any:
+    """Return the inertia of a body: a number, or moments or a tensor in space."""
+    if np.ndim(value) == 0:
+        return require_number(value, what, at_least=0.0)
+    given = require_array(value, what)
+    tensor = np.diag(given) if given.shape == (3,) else given
+    if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T, rtol=1e-12):
+        raise ModelError(f"{what} must be three moments, or a symmetric 3 x 3 matrix")
+    a, b, c = np.linalg.eigvalsh(tensor)
+    if a < -1e-12 * c or c > (a + b) * (1 + 1e-9):
+        raise ModelError(
+            f"{what} has the principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m²; no body has them: "
+            "none is negative, and the largest is at most the sum of the others"
+        )
+    return tuple(map(tuple, tensor.tolist())) if given.ndim == 2 else tuple(given.tolist())
+
+
 @dataclass(frozen=True, eq=False)
 class Body(Record):
     """Rigid body; joints, connectors and point loads may act at any of its points.
@@ -147,7 +163,8 @@ class Body(Record):
     Args:
         center: Centre of mass in the undeformed scene; m.
         mass: Mass; kg.
-        inertia: Moment of inertia about the centre of mass; kg m².
+        inertia: Moment of inertia about the centre of mass; in space the moments about axes along
+            x, y and z of the undeformed scene, or a symmetric 3 x 3 matrix; kg m².
         name: Name in messages and pictures.
 
     Raises:
@@ -160,18 +177,32 @@ class Body(Record):
         Revolute(beam.end (2, 0), rotor (2, 0))
     """
 
-    center: Vector
+    center: VectorOfScene
     _: KW_ONLY
     mass: NotNegative = 0.0
-    inertia: NotNegative = 0.0
+    inertia: Annotated[Any, require_inertia_of_body] = 0.0
     name: Text = "body"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.ndim(self.inertia) and len(self.center) == 2:
+            raise ModelError(f"{self.name}: inertia in the plane is a number")
+
+    @property
+    def tensor(self) -> tuple[tuple[float, ...], ...]:
+        """Tensor of inertia in space; kg m²."""
+        given = np.asarray(self.inertia, dtype=float)
+        return tuple(map(tuple, (given if given.ndim == 2 else given * np.eye(3)).tolist()))
 
     def _label(self) -> str:
         return self.name
 
-    def at(self, x: float, y: float) -> BodyPoint:
-        """Return the point of the body that is at (x, y) in the undeformed scene; m."""
-        return BodyPoint(self, (x, y))
+    def at(self, x: float, y: float, *z: float) -> BodyPoint:
+        """Return the point of the body that is at (x, y) in the undeformed scene; m.
+
+        In space it has a third coordinate.
+        """
+        return BodyPoint(self, (x, y, *z))  # type: ignore[arg-type]
 
     @property
     def middle(self) -> BodyPoint:
@@ -201,7 +232,11 @@ class BodyPoint:
 
     def __post_init__(self) -> None:
         require_kind(self.body, Body, "BodyPoint: body")
-        point = require_vector(self.point, f"{self.body.name}.at(x, y)")
+        point = require_point(self.point, f"{self.body.name}.at(x, y)")
+        if self.body is not GROUND and len(point) != len(self.body.center):
+            raise ModelError(
+                f"{self.body.name}.at{point}: give {len(self.body.center)} coordinates, as its centre"
+            )
         object.__setattr__(self, "point", point)
 
     def __str__(self) -> str:
@@ -212,14 +247,14 @@ GROUND = Body((0.0, 0.0), name="ground")
 """The body that does not move."""
 
 
-def ground(x: float, y: float) -> BodyPoint:
-    """Return the point (x, y) of the ground; m.
+def ground(x: float, y: float, *z: float) -> BodyPoint:
+    """Return the point (x, y), in space (x, y, z), of the ground; m.
 
     Example:
         >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)
         >>> pendulum = ub.Scene([beam], joints=[pivot], loads=[ub.Gravity()])
     """
-    return BodyPoint(GROUND, (x, y))
+    return BodyPoint(GROUND, (x, y, *z))  # type: ignore[arg-type]
 
 
 AttachmentPoint = Place | BodyPoint
@@ -279,7 +314,7 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     The vector is zero for points of the ground, which do not move.
     """
     if node(place) is GROUND or (point is None and isinstance(place, Place)):
-        return 0.0, 0.0
+        return (0.0,) * len(place.point)  # type: ignore[return-value]
     at = point or place.point
     of_node = place.body.center if isinstance(place, BodyPoint) else place.point
     return tuple(x - n for x, n in zip(at, of_node, strict=True))  # type: ignore[return-value]

@@ -208,9 +208,10 @@ def curve_point(curve: Curve, s: float, what: str) -> Point:
     return require_point(point, f"{what}({s:g})")  # type: ignore[return-value]
 
 
-def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:
-    """Return the points of each curve at its own parameters, curve by curve; (n, 2 or 3); m."""
-    d = len(curves[0](0.0)) if curves else 2
+def points_along(
+    curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array], d: int = 2
+) -> Array:
+    """Return the points of each curve at its own parameters, curve by curve; (n, d); m."""
     ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * (2 * d) for c in curves]
     counts = [len(s) for s in parameters]
     s = np.concatenate([np.empty(0), *parameters])

@@ -31,11 +31,26 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_all
 from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic
-from ufl_beam.model.connectors import Component, Connector, plastic_hinges
+from ufl_beam.model.connectors import (
+    Component,
+    Connector,
+    Slide,
+    Stretch,
+    Turn,
+    plastic_hinges,
+)
 from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.joints import Joint, Rigid
+from ufl_beam.model.joints import (
+    Joint,
+    Link,
+    Prismatic,
+    Revolute,
+    Rigid,
+    RigidLink,
+    Spherical,
+)
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
@@ -167,7 +182,8 @@ class Scene(Record, Rich):
     @property
     def in_space(self) -> bool:
         """True if points of the scene have three coordinates."""
-        return any(len(beam.ends[0]) == 3 for beam in self.beams)
+        points = (*(b.ends[0] for b in self.beams), *(b.center for b in self.bodies))
+        return any(len(point) == 3 for point in points)
 
     def _require_one_dimension(self) -> None:
         """Raise unless all vectors have two components, or three in a scene of known kinds."""
@@ -211,11 +227,13 @@ class Scene(Record, Rich):
         beams = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
         vertices = {kind: np.array(b.vertices(())) for kind, b in beams.items()}
         curves = [beam.curve for beam in self.beams]
-        on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
+        d = 3 if self.in_space else 2
+        on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams], d)
         others = [body.center for body in self.bodies]
         others += [place.point for _, place in self.attachments() if isinstance(place, BodyPoint)]
-        points = np.concatenate([on_beams, np.reshape(others, (-1, on_beams.shape[1]))])
-        gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
+        points = np.concatenate([on_beams, np.reshape(others, (-1, d))])
+        heavy = (b for b in self.bodies if b.mass > 0)
+        gyration = [math.sqrt(np.linalg.eigvalsh(b.tensor).max() / b.mass) for b in heavy]
         return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
 
     @cached_property
@@ -378,7 +396,10 @@ class Scene(Record, Rich):
                 holders[dof] = str(support)
 
 
-IN_SPACE = (Beam, Rigid, Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity)
+IN_SPACE = (
+    Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
+    Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity,
+)  # fmt: skip
 """Classes of the objects of scenes in space."""
 
 
@@ -387,7 +408,7 @@ def require_space(scene: Scene) -> None:
     records: list[Any] = [*scene.joints, *scene.supports, *scene.loads, *scene.masses]
     records += [*scene.initial, *scene.damping, *scene.bodies, *scene.connectors, *scene.works]
     for record in records:
-        if not isinstance(record, IN_SPACE) or getattr(record, "multipliers", False):
+        if not isinstance(record, IN_SPACE):
             raise ModelError(
                 f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in "
                 f"space have {', '.join(x.__name__ for x in IN_SPACE)}"

@@ -19,7 +19,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
-from ufl_beam.discretization.cells_in_space import TURNS, of_vertices
+from ufl_beam.discretization.cells_in_space import TURNS
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import in_one_line
@@ -133,7 +133,7 @@ class Columns:
             "material": (
                 len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT),
             ),
-            **({TURNS: (len(numbering.points), 4)} if scene.in_space else {}),
+            **({TURNS: (len(numbering.points) + len(scene.rigid_bodies), 4)} if scene.in_space else {}),
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
@@ -271,11 +271,10 @@ class StateWriter:
             rows = at["material"].start + width * sections.ravel()
             first = width * np.arange(len(rows))
             self._add(self._place(term.points.recorded), first[:, None] + k, rows[:, None] + k)
-        for cells in in_space:
-            of_nodes = cells.turns(of_vertices(numbering)).ravel()
-            self._add(
-                self._place(cells.states), of_nodes, at[TURNS].start + np.arange(of_nodes.size)
-            )
+        for term in in_space:
+            mine, nodes = term.turns(numbering)
+            rows = at[TURNS].start + 4 * nodes[:, None] + np.arange(4)
+            self._add(self._place(term.states), mine, rows)
         for connector in connector_terms:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices
             self._add(now, connector.forces_at, rows + FORCE)

@@ -291,9 +291,11 @@ class States:
             ArgumentError: The beam or body of the place is not in the scene.
         """
         motion = values_at(self.numbering, place, self.column("q"))
-        if self.scene.in_space and isinstance(place, Place):
-            motion[:, 3:] = turns_at(self.numbering, place, self.column(TURNS)).as_rotvec()
-        if isinstance(place, BodyPoint):
+        if self.scene.in_space:
+            turns = turns_at(self.numbering, place, self.column(TURNS))
+            motion[:, :3] += turns.apply(arm(place)) - arm(place)
+            motion[:, 3:] = turns.as_rotvec()
+        elif isinstance(place, BodyPoint):
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
 
@@ -310,7 +312,8 @@ class States:
     def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""
         if isinstance(place, BodyPoint):
-            return np.asarray(place.point + self.displacement(place)[:, :2])
+            u = self.displacement(place)[:, : self.numbering.displacements]
+            return np.asarray(place.point + u)
         nodes, weights = self.numbering.weights(place)
         u = self.displacement(place)[:, : self.numbering.displacements]
         return np.asarray(weights @ self.numbering.points[nodes] + u)

@@ -310,7 +310,7 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
     for connector, dofs in zip(
         numbering.scene.all_connectors, numbering.dofs_of_connectors, strict=True
     ):
-        a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
+        a, b = v[dofs[:-1]].reshape(-1, 2).T
         by_a, by_b = connector.rigidly()
         rate = float(np.dot(by_a, a) + np.dot(by_b, b))
         if connector.law is RIGID and abs(rate) > 1e-9 * fastest / (

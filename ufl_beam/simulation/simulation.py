@@ -412,7 +412,7 @@ class Simulation(Stepper):
     def _writer(self) -> StateWriter:
         return StateWriter(
             self.time_loop, self.subdomain, self.ledger, self.supports, self.inelastic,
-            self.connector_terms, self.cell_forces, self.equation.in_space,
+            self.connector_terms, self.cell_forces, self.equation.nodes_in_space,
         )  # fmt: skip
 
     @property

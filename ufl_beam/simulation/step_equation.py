@@ -20,7 +20,7 @@ from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
-from ufl_beam.blocks.spatial_beams import CellsInSpace, dead_moments
+from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space, dead_moments
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -121,10 +121,12 @@ class StepEquation:
         if scene.beams:
             ledger.state["stored"] += 0.0
         subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
-        self.in_space: list[CellsInSpace] = []
+        self.in_space, self.nodes_in_space = list[CellsInSpace](), list[Any]()
         if scene.in_space:
-            self.in_space = [CellsInSpace(fields, in_blocks)]
+            self.in_space = [CellsInSpace(fields, in_blocks)] if len(fields.order) else []
             self.loads += dead_moments(in_blocks)
+            self.nodes_in_space += [*self.in_space, *bodies_in_space(in_blocks)]
+            others += self.nodes_in_space[len(self.in_space) :]
         elif elastic.any():
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
@@ -211,7 +213,7 @@ class StepEquation:
         archive = Archive(self.subdomain)
         prediction.save_or_restore(archive)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.in_space, *self.connector_terms):
+        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
             term.save_or_restore(archive, q)
         friction = any(
             has_friction(connector.law)
@@ -243,8 +245,8 @@ class StepEquation:
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.in_space, *self.connector_terms):
-            term.save_or_restore(archive, NOWHERE if term not in self.in_space else q)
+        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
+            term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
         unknown = archive.unknown.copy()
         for load in self.loads:
             if isinstance(load, Block) and load.remembers:
