@@ -216,15 +216,15 @@ class OnConnector(Statement):
         """Return the same of motions in space; the state is the quaternions of the nodes."""
         turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
         u = ([vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1"))
-        nodes = [
-            NodeInStep(*ends, turn, tuple(w[:3]), tuple(w[3:]), self.scheme)
-            for *ends, turn, w in zip(*u, turns, virtual, strict=True)
+        a, b = [
+            NodeInStep(before, now, turn, tuple(w[:3]), tuple(w[3:]), self.scheme)
+            for before, now, turn, w in zip(*u, turns, virtual, strict=True)
         ]
         found = list[tuple[Expr, ...]]()
         for k, motion in enumerate(self.motions):
             given = np.reshape([at[f"{name} {k}"] for name in PLACES_IN_SPACE], (-1, 3))
             geometry = GeometryInSpace(*map(tuple, given.tolist()))
-            found.append(SPATIAL_MOTIONS[motion](*nodes, geometry, self.scheme))
+            found.append(SPATIAL_MOTIONS[motion](a, b, geometry, self.scheme))
         return found, new_state(turns)
 
 

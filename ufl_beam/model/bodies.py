@@ -153,7 +153,8 @@ def require_inertia_of_body(value: Any, what: str) -> Any:
             f"{what} has the principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m²; no body has them: "
             "none is negative, and the largest is at most the sum of the others"
         )
-    return tuple(map(tuple, tensor.tolist())) if given.ndim == 2 else tuple(given.tolist())
+    rows: Any = tensor.tolist()
+    return tuple(map(tuple, rows)) if given.ndim == 2 else tuple(map(float, given))
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +193,8 @@ class Body(Record):
     def tensor(self) -> tuple[tuple[float, ...], ...]:
         """Tensor of inertia in space; kg m²."""
         given = np.asarray(self.inertia, dtype=float)
-        return tuple(map(tuple, (given if given.ndim == 2 else given * np.eye(3)).tolist()))
+        rows: Any = given if given.ndim == 2 else given * np.eye(3)
+        return tuple(tuple(map(float, row)) for row in rows)
 
     def _label(self) -> str:
         return self.name
@@ -235,7 +237,8 @@ class BodyPoint:
         point = require_point(self.point, f"{self.body.name}.at(x, y)")
         if self.body is not GROUND and len(point) != len(self.body.center):
             raise ModelError(
-                f"{self.body.name}.at{point}: give {len(self.body.center)} coordinates, as its centre"
+                f"{self.body.name}.at{point}: the centre has {len(self.body.center)} coordinates; "
+                "give as many"
             )
         object.__setattr__(self, "point", point)
 
@@ -317,7 +320,7 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
         return (0.0,) * len(place.point)  # type: ignore[return-value]
     at = point or place.point
     of_node = place.body.center if isinstance(place, BodyPoint) else place.point
-    return tuple(x - n for x, n in zip(at, of_node, strict=True))  # type: ignore[return-value]
+    return tuple(x - n for x, n in zip(at, of_node, strict=True))
 
 
 def moves_with_node(place: AttachmentPoint) -> bool:

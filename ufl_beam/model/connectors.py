@@ -354,8 +354,13 @@ def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: 
             "undeformed scene"
         )
     if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes from files must not change
-        return given  # type: ignore[no-any-return]
-    return tuple(x / length for x in given)  # type: ignore[return-value]
+        return tuple(given)  # type: ignore[return-value]
+    return tuple(x / length for x in given)
+
+
+def axes_of(point: Sequence[float]) -> list[tuple[float, ...]]:
+    """Return the unit vectors along the axes of the plane, or of space."""
+    return [tuple(float(i == k) for i in range(len(point))) for k in range(len(point))]
 
 
 def across(axis: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -10,8 +10,6 @@ from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
@@ -31,6 +29,7 @@ from ufl_beam.model.connectors import (
     Component,
     Connector,
     across,
+    axes_of,
     require_apart,
     unit_axis,
 )
@@ -126,11 +125,11 @@ class _AtPoint(Joint):
         shared = () if self.multipliers else self.joined
         moving = [place for place in self.places if self.multipliers or not moves_with_node(place)]
         base = next((place for place in self.places if place not in moving), self.places[0])
-        axes = [tuple(e) for e in np.eye(len(self.places[0].point)).tolist()]
+        axes = axes_of(self.places[0].point)
         motions: list[tuple[Any, ...]] = [("parting", axis) for axis in axes]
         if self.multipliers and 2 in self.joined:
             pairs = zip(axes, [*axes[1:], axes[0]], strict=True)
-            in_space = [("aligning", axis, other) for axis, other in pairs]
+            in_space: list[tuple[Any, ...]] = [("aligning", axis, other) for axis, other in pairs]
             motions += in_space if len(axes) == 3 else [("turning", axes[0])]
         held = ((x, [*motions * (x in moving), *self.directions()]) for x in self.places)
         holders = tuple(
@@ -191,15 +190,15 @@ class Revolute(_AtPoint):
         self.__post_init__()
 
     def __post_init__(self) -> None:
-        d = len(self.places[0].point) if self.places else 2
-        if (d == 3) != (self.axis is not None):
+        in_space = any(len(getattr(x, "point", ())) == 3 for x in self.places)
+        if in_space != (self.axis is not None):
             raise ModelError(
                 f"{self}: in space give axis=(x, y, z), about which the places turn, or use "
                 "Spherical; in the plane there is no axis"
             )
         if self.axis is not None:
             a, b = self.places[:2]
-            vars(self).update(axis=unit_axis(a, b, self.axis, "Revolute"))  # type: ignore[arg-type]
+            vars(self).update(axis=unit_axis(a, b, self.axis, "Revolute"))
         super().__post_init__()
 
     def directions(self) -> list[tuple[Any, ...]]:
@@ -227,7 +226,7 @@ class Spherical(_AtPoint):
     multipliers: Switch
 
     def __post_init__(self) -> None:
-        if self.places and len(self.places[0].point) == 2:
+        if any(len(getattr(x, "point", ())) == 2 for x in self.places):
             raise ModelError(f"{self}: ball joints are in space; use Revolute in the plane")
         super().__post_init__()
 
@@ -294,8 +293,7 @@ class RigidLink(Joint):
         corner = self.b.point
         if self.a.point == corner:
             raise ModelError(f"{self}: zero length; join the places with Rigid")
-        axes = np.eye(len(corner)).tolist()
-        holders = tuple(self._hold("parting", tuple(axis), corner) for axis in axes)
+        holders = tuple(self._hold("parting", axis, corner) for axis in axes_of(corner))
         vars(self).update(holders=holders)
 
 

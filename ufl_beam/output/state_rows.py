@@ -125,6 +125,7 @@ class Columns:
         column "record"; if None, the row has forces of cells.
         """
         size, scene = numbering.size, numbering.scene
+        nodes = len(numbering.points) + len(scene.rigid_bodies)
         return cls({
             "t": (),  # time, s; or the load factor of a path
             "reactions": (len(scene.supports), numbering.width),  # of supports, in their axes
@@ -133,7 +134,7 @@ class Columns:
             "material": (
                 len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT),
             ),
-            **({TURNS: (len(numbering.points) + len(scene.rigid_bodies), 4)} if scene.in_space else {}),
+            **({TURNS: (nodes, 4)} if scene.in_space else {}),
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
