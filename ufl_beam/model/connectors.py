@@ -354,7 +354,7 @@ def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: 
             "undeformed scene"
         )
     if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes from files must not change
-        return tuple(given)  # type: ignore[return-value]
+        return tuple(given)
     return tuple(x / length for x in given)
 
 
