@@ -196,6 +196,35 @@ def test_a_revolute_joint_keeps_its_axis():
     assert np.linalg.norm(relative.as_rotvec(), axis=1).max() > 1.0
 
 
+def test_momenta_are_constant_in_flight():
+    run = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 10), dt=0.1, progress=False)
+    free = run.momentum()[run.times >= 5.0]
+    for some in (slice(0, 3), slice(3, 6)):
+        size = np.linalg.norm(free[0, some])
+        assert size > 1.0
+        assert np.abs(free[:, some] - free[0, some]).max() < 1e-11 * size
+
+
+def test_section_forces_of_a_cantilever():
+    """Small loads: forces and moments of beam theory, in the axes of the section."""
+    section = ub.Section(**STIFF, **OTHER)
+    up, length = np.array([0.6, 0.0, 0.8]), 4.0  # the beam is along y
+    beam = ub.Beam((0, 0, 0), (0, length, 0), section, cells=4, up=tuple(up))
+    third = np.cross([0, 1, 0], up)
+    force, moment = 1e-4 * (3.0 * up - 2.0 * third + [0, 5.0, 0]), 1e-4 * np.array([0, 7.0, 0])
+    load = ub.PointLoad(beam.end, force=tuple(force), moment=tuple(moment))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    arm = length - (np.arange(4) + 0.5) * length / 4
+    expected = 1e-4 * np.column_stack(
+        [np.full(4, 5.0), np.full(4, 3.0), np.full(4, -2.0), np.full(4, 7.0), 2 * arm, 3 * arm]
+    )
+    assert np.abs(run.section_forces(beam) - expected).max() < 1e-4 * np.abs(expected).max()
+    bent = 1e-4 * (3.0 * length**3 / 3 / section.EI + 3.0 * length / section.GA)
+    tip = run.displacement(beam.end)[-1]
+    assert abs(tip[:3] @ up / bent - 1) < 2e-2  # four cells
+
+
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**STIFF, **OTHER), name="arm")
 PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
 WRONG = {
@@ -247,3 +276,29 @@ def test_errors_before_a_run(case):
     make, words = WRONG[case]
     with pytest.raises(ub.ModelError, match=re.escape(words)):
         make()
+
+
+def refused():
+    """Functions that know planar scenes only, by name."""
+    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+    dynamic = {"scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 0.05, "progress": False}
+    run = ub.simulate(scene, **dynamic)
+    control = ub.LoadControl(0.1)
+    return {
+        "plot": lambda: ub.plot(run),
+        "render": lambda: ub.render(run, "unused.png"),
+        "modes": lambda: ub.modes(scene, 1),
+        "follow": lambda: ub.follow(scene, control, steps=1),
+        "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
+        "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),
+        "section forces": lambda: run.section_forces_at(BEAM.end),
+        "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),
+        "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.mesh,
+    }
+
+
+@pytest.mark.serial
+def test_what_is_planar_says_so():
+    for call in refused().values():
+        with pytest.raises(ub.ModelError, match="only for scenes in the plane"):
+            call()

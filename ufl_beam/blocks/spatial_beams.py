@@ -26,9 +26,9 @@ from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import (
+    STIFFNESS_IN_SPACE,
     cell_axes,
     of_vertices,
-    quaternions,
     rotary_inertia,
 )
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -41,8 +41,6 @@ from ufl_beam.mechanics.spatial_kinematics import (
     cross,
     dot,
     forces_over_step,
-    matrix,
-    product,
     scale,
     subtract,
     times,
@@ -51,9 +49,6 @@ from ufl_beam.mechanics.spatial_kinematics import (
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
 from ufl_beam.model.loads import PointLoad
 from ufl_beam.terms.term import Callbacks, Phases
-
-STIFFNESS = "EA", "GA", "GA3", "GJ", "EI2", "EI"
-"""Stiffnesses for the strains along the axes 1, 2, 3 of a section, and the rotations about them."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +96,11 @@ class ElasticCellInSpace(StatementInSpace):
 
     @property
     def numbers(self) -> list[str]:
-        """Stiffnesses, "alpha", length, slope and axes of the cell, rotary inertia."""
-        inertia = [f"J{i}" for i in (1, 2, 3)] * has_inertia(self.scheme)
+        """Stiffnesses, "alpha", length and axes of the cell, rotary inertia."""
+        inertia = [f"J{i}{j}" for i in range(3) for j in range(3)] * self.rates
         return [
-            *STIFFNESS, *["alpha"] * bool(self.scheme.alpha), "h", "t0", "t1", "t2",
-            *(f"R{i}" for i in range(4)), *inertia,
+            *STIFFNESS_IN_SPACE, *["alpha"] * bool(self.scheme.alpha), "h",
+            *(f"R{i}{j}" for i in range(3) for j in range(3)), *inertia,
         ]  # fmt: skip
 
     @property
@@ -115,45 +110,36 @@ class ElasticCellInSpace(StatementInSpace):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
-        h, axes = at["h"], tuple(at[f"R{i}"] for i in range(4))
-        into, t = matrix(axes), tuple(at[f"t{i}"] for i in range(3))
-        q0 = [product(quaternion(at, k), axes) for k in (0, 1)]
-        rotations = [transposed_times(into, change(at, "abc", k)) for k in (0, 1)]
-        rotations = [tuple(map(at.stage, m)) for m in rotations]
-        turns = [Turn(at.stage, m, q) for m, q in zip(rotations, q0, strict=True)]
+        h, axes, at_end = at["h"], _matrix(at, "R"), acts_at_end(self.scheme)
+        q0 = [quaternion(at, k) for k in (0, 1)]
+        turns = [Turn(at.stage, change(at, "abc", k), q0[k]) for k in (0, 1)]
         u = [[vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
-        slopes = [tuple(map(at.stage, add(t, scale(1 / h, subtract(b, a))))) for a, b in u]
+        slopes = [tuple(map(at.stage, scale(1 / h, subtract(b, a)))) for a, b in u]
         old, now = Middle(at.stage, *q0), Middle(at.stage, *(turn.q1 for turn in turns))
         e0, e1 = (
-            tuple(map(at.stage, _strains(*pair, h)))
-            for pair in zip((old, now), slopes, strict=True)
+            tuple(map(at.stage, _strains(middle, slope, axes, h)))
+            for middle, slope in zip((old, now), slopes, strict=True)
         )
-        C = [at[name] for name in STIFFNESS]
+        C = [at[name] for name in STIFFNESS_IN_SPACE]
         own, predicted = self._resultants(at, C, e0, e1), [None] * 6
         if not self.rates:
-            predicted = self._resultants(at, C, e0, self._predicted(at, q0, u[0], t, into))
-        resultants = [at.stage(r, in_tangent=x) for r, x in zip(own, predicted, strict=True)]
-        pair: Any = turns
-        if acts_at_end(self.scheme):
-            old, slopes = now, [slopes[1]] * 2
-            pair = [turn.at_end for turn in turns]
-        N, *moments = forces_over_step(
-            at.stage, pair, (old, now), slopes, h, (resultants[:3], resultants[3:])
-        )
-        at_end = acts_at_end(self.scheme)
+            predicted = self._resultants(at, C, e0, self._predicted(at, q0, u[0], axes))
+        r = [at.stage(x, in_tangent=y) for x, y in zip(own, predicted, strict=True)]
+        pair, tangents = turns, [add(transposed_times(axes, FIRST), slope) for slope in slopes]
+        if at_end:
+            old, tangents, pair = now, [tangents[1]] * 2, [turn.at_end for turn in turns]
+        resultants = [tuple(map(at.stage, transposed_times(axes, x))) for x in (r[:3], r[3:])]
+        N, *moments = forces_over_step(at.stage, pair, (old, now), tangents, h, resultants)
         on_nodes = [x.on_node(M, at_end=at_end) for x, M in zip(turns, moments, strict=True)]
         if self.rates:
-            on_nodes = [
-                add(x, y) for x, y in zip(on_nodes, self._turning(at, rotations), strict=True)
-            ]
-        on_nodes = [times(into, x) for x in on_nodes]
+            turning = self._turning(at, [turn.m for turn in turns])
+            on_nodes = [add(x, y) for x, y in zip(on_nodes, turning, strict=True)]
         forces = [x for i in range(3) for x in (-N[i], N[i])]
-        forces += [x for pair in zip(*on_nodes, strict=True) for x in pair]
+        forces += [x for both in zip(*on_nodes, strict=True) for x in both]
         stored = h / 2 * sum(C[i] * e1[i] ** 2 for i in range(6))
         growth = sum(C[i] * (e1[i] - e0[i]) ** 2 for i in range(6))
         lost = {"numerical": at["alpha"] * h * growth} if self.scheme.alpha else {}
-        back = (axes[0], *(-x for x in axes[1:]))
-        return Equations(forces, new_state(turns, back), {"stored": stored}, lost)
+        return Equations(forces, new_state(turns), {"stored": stored}, lost)
 
     def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
         found = list[Expr]()
@@ -164,7 +150,7 @@ class ElasticCellInSpace(StatementInSpace):
         return found
 
     def _predicted(
-        self, at: Inputs, q0: Sequence[Vector], u0: Sequence[Vector], t: Vector, into: Any
+        self, at: Inputs, q0: Sequence[Vector], u0: Sequence[Vector], axes: Any
     ) -> Vector:
         """Return the strains that the latest tangent predicts."""
         along, turns, u = ufl.variable(ufl.as_ufl(0.0)), list[Turn](), list[Vector]()
@@ -175,19 +161,18 @@ class ElasticCellInSpace(StatementInSpace):
             )
             moved = add(last, scale(along, further))
             u.append(add(u0[k], moved[:3]))
-            turns.append(Turn(_same, transposed_times(into, moved[3:]), q0[k]))
-        slope = add(t, scale(1 / at["h"], subtract(u[1], u[0])))
-        e = _strains(Middle(_same, *(turn.q1 for turn in turns)), slope, at["h"])
+            turns.append(Turn(_same, moved[3:], q0[k]))
+        slope = scale(1 / at["h"], subtract(u[1], u[0]))
+        e = _strains(Middle(_same, *(turn.q1 for turn in turns)), slope, axes, at["h"])
         return tuple(x + at["moved"] * ufl.diff(x, along) for x in e)
 
     def _turning(self, at: Inputs, own: Sequence[Vector]) -> list[Vector]:
-        """Return the moments by which the momenta of the nodes turn, in axes of the cell."""
-        into, J = matrix(tuple(at[f"R{i}"] for i in range(4))), [at[f"J{i}"] for i in (1, 2, 3)]
-        momenta = list[Vector]()
+        """Return the moments by which the momenta of the nodes turn."""
+        J, momenta = _matrix(at, "J"), list[Vector]()
         for k, m in enumerate(own):
-            before = transposed_times(into, vector(at, "rate1", "abc", k))
+            before = vector(at, "rate1", "abc", k)
             ω = add(scale(at["rates 0 0"], m), scale(at["rates 0 1"], before))
-            momenta.append(tuple(j * x for j, x in zip(J, ω, strict=True)))
+            momenta.append(times(J, ω))
         found = list[Vector]()
         for k, m in enumerate(own):
             sums = add(scale(2.0, momenta[k]), momenta[1 - k])
@@ -200,10 +185,24 @@ def _same(x: Expr) -> Expr:
     return x
 
 
-def _strains(middle: Middle, slope: Vector, h: Expr) -> Vector:
-    """Return the strains along, and curvatures about, the axes 1, 2, 3 of a cell."""
-    stretch, *shear = transposed_times(middle.frame, slope)
-    return (stretch - 1.0, *shear, *scale(1 / h, middle.rotation_vector))
+FIRST = 1.0, 0.0, 0.0
+"""Axis 1 of a cell, in its axes."""
+
+
+def _matrix(at: Inputs, name: str) -> tuple[Vector, ...]:
+    """Return a matrix among the numbers; the rows of R are the axes of the cell."""
+    return tuple(tuple(at[f"{name}{i}{j}"] for j in range(3)) for i in range(3))
+
+
+def _strains(middle: Middle, slope: Vector, axes: Any, h: Expr) -> Vector:
+    """Return the strains along, and curvatures about, the axes 1, 2, 3 of a cell.
+
+    ``slope`` is the derivative of the displacement.  A cell at rest has strains of exactly zero.
+    """
+    moved = transposed_times(middle.frame, slope)
+    turned = transposed_times(middle.turned, transposed_times(axes, FIRST))
+    curvature = scale(1 / h, middle.rotation_vector)
+    return (*times(axes, add(moved, turned)), *times(axes, curvature))
 
 
 class CellsInSpace(Block):
@@ -211,12 +210,12 @@ class CellsInSpace(Block):
 
     def __init__(self, fields: Fields, setting: BlockSetting) -> None:
         scheme, n = setting.scheme, len(fields.order)
-        numbers = [*fields.section_values(*STIFFNESS).T]
+        numbers = [*fields.section_values(*STIFFNESS_IN_SPACE).T]
         numbers += [np.full(n, scheme.alpha)] * bool(scheme.alpha)
         lengths, axes = cell_axes(fields)
-        numbers += [lengths, *axes[:, :, 0].T, *quaternions(axes).T]
+        numbers += [lengths, *axes.transpose(2, 1, 0).reshape(9, n)]
         if has_inertia(scheme):
-            numbers += [*rotary_inertia(fields).T]
+            numbers += [*rotary_inertia(fields, axes).reshape(n, 9).T]
         cells = fields.subdomain.cells[fields.order]
         elements = Elements(
             "cells in space", cells, fields.cell_dofs, numbers, cells=fields.order,

@@ -17,6 +17,10 @@ TURNS = "turns"
 so that all numbers begin with zero."""
 
 
+STIFFNESS_IN_SPACE = "EA", "GA", "GA3", "GJ", "EI2", "EI"
+"""Stiffnesses for the strains along the axes 1, 2, 3 of a section, and curvatures about them."""
+
+
 def cell_axes(fields: Fields) -> tuple[Array, Array]:
     """Return the lengths of cells, and their axes as columns; (n,), m; (n, 3, 3)."""
     numbering = fields.subdomain.numbering
@@ -30,15 +34,11 @@ def cell_axes(fields: Fields) -> tuple[Array, Array]:
     return lengths, np.stack([first, second, np.cross(first, second)], axis=2)
 
 
-def quaternions(axes: Array) -> Array:
-    """Return the unit quaternions, real part first, of rotation matrices; (n, 4)."""
-    return np.roll(Rotation.from_matrix(axes).as_quat(), 1, axis=1)
-
-
-def rotary_inertia(fields: Fields) -> Array:
-    """Return the rotary inertia per length about the axes 1, 2, 3 of cells; (n, 3); kg m."""
+def rotary_inertia(fields: Fields, axes: Array) -> Array:
+    """Return the tensors of rotary inertia per length of cells; (n, 3, 3); kg m."""
     third, second = fields.section_values("rhoI", "rhoI2").T
-    return np.stack([second + third, second, third], axis=1)
+    moments = np.stack([second + third, second, third], axis=1)
+    return np.einsum("nik,nk,njk->nij", axes, moments, axes)
 
 
 def mass_matrix_in_space(fields: Fields) -> Csr:
@@ -46,7 +46,7 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
     A, n, (lengths, axes) = fields.matrix(), len(fields.order), cell_axes(fields)
     blocks = np.zeros((n, 6, 6))
     blocks[:, range(3), range(3)] = fields.section_values("rhoA")
-    blocks[:, 3:, 3:] = np.einsum("nik,nk,njk->nij", axes, rotary_inertia(fields), axes)
+    blocks[:, 3:, 3:] = rotary_inertia(fields, axes)
     shares = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6
     cells = np.einsum("n,ab,nij->niajb", lengths, shares, blocks).reshape(n, 12, 12)
     dofs = fields.cell_dofs
@@ -58,6 +58,35 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
         inertia[range(3), range(3)], inertia[3:, 3:] = body.mass, body.tensor
         np.add.at(A.data, A.positions(np.repeat(own, 6), np.tile(own, 6)), inertia.ravel())
     return A
+
+
+def strains_in_space(fields: Fields, q: Array, turns: Array) -> Array:
+    """Return the strains along, and curvatures about, axes 1, 2, 3 of cells; (n, 6); 1, 1/m."""
+    numbering, (lengths, axes) = fields.subdomain.numbering, cell_axes(fields)
+    a, b = numbering.cells.T
+    at = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
+    first, second = _rotations(turns[a]), _rotations(turns[b])
+    between = (first.inv() * second).as_rotvec()
+    middle = first * Rotation.from_rotvec(between / 2)
+    slope = middle.inv().apply((at[b] - at[a]) / lengths[:, None])
+    both = (np.einsum("nik,ni->nk", axes, x) for x in (slope, between / lengths[:, None]))
+    return np.hstack([*both]) - np.eye(6)[0]
+
+
+def momentum_in_space(numbering: DofNumbering, q: Array, p: Array, turns: Array) -> Array:
+    """Return momentum and angular momentum about the origin of products p of mass and rates; (6,).
+
+    The shapes of ``q`` and ``p`` are (size,), of ``turns`` (nodes, 4).
+    """
+    dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])
+    centres = np.reshape([body.center for body in numbering.scene.bodies], (-1, 3))
+    ground = np.zeros((len(dofs) - len(numbering.points) - len(centres), 3))
+    points = np.vstack([numbering.points, centres, ground])
+    _, linear = np.unique(dofs[:, 0], return_index=True)
+    _, angular = np.unique(dofs[:, 3], return_index=True)
+    at, forces = points[linear] + q[dofs[linear, :3]], p[dofs[linear, :3]]
+    spins = _rotations(turns[angular]).apply(p[dofs[angular, 3:]])
+    return np.append(forces.sum(axis=0), np.cross(at, forces).sum(axis=0) + spins.sum(axis=0))
 
 
 def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) -> Rotation:

@@ -71,14 +71,25 @@ def conjugate(q: Vector) -> Vector:
     return (q[0], -q[1], -q[2], -q[3])
 
 
-def matrix(q: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the rows of the rotation matrix of a unit quaternion."""
+def turned(q: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the rows of the rotation matrix of a unit quaternion, minus the unit matrix."""
     r, x, y, z = q
     return (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - r * z), 2 * (x * z + r * y)),
-        (2 * (x * y + r * z), 1 - 2 * (x * x + z * z), 2 * (y * z - r * x)),
-        (2 * (x * z - r * y), 2 * (y * z + r * x), 1 - 2 * (x * x + y * y)),
+        (-2 * (y * y + z * z), 2 * (x * y - r * z), 2 * (x * z + r * y)),
+        (2 * (x * y + r * z), -2 * (x * x + z * z), 2 * (y * z - r * x)),
+        (2 * (x * z - r * y), 2 * (y * z + r * x), -2 * (x * x + y * y)),
     )
+
+
+def _plus_one(rows: Sequence[Vector]) -> tuple[Vector, ...]:
+    return tuple(
+        tuple(x + 1 if i == j else x for j, x in enumerate(row)) for i, row in enumerate(rows)
+    )
+
+
+def matrix(q: Vector) -> tuple[Vector, ...]:
+    """Return the rows of the rotation matrix of a unit quaternion."""
+    return _plus_one(turned(q))
 
 
 def times(R: Sequence[Vector], a: Vector) -> Vector:
@@ -106,8 +117,8 @@ class Turn:
         self.m, self.q0, self.frame = m, q0, matrix(q0)
         v = scale(0.5, m)
         self.c = stage(1 / ufl.sqrt(1 + dot(v, v)))
-        turned = product(q0, (ufl.as_ufl(1.0), *v))
-        self.q1 = tuple(stage(self.c * x) for x in turned)
+        q1 = product(q0, (ufl.as_ufl(1.0), *v))
+        self.q1 = tuple(stage(self.c * x) for x in q1)
         self.s = tuple(map(stage, times(self.frame, m)))
 
     @property
@@ -140,7 +151,7 @@ class Middle:
 
     Attributes:
         r: Relative rotation of the nodes as a quaternion, in axes of either.
-        frame: Rotation matrix of the middle.
+        turned, frame: Rotation matrix of the middle minus the unit matrix, and the matrix.
         κ, λ, y: Cosines of a quarter and an eighth of the angle Θ between the nodes; sin²(Θ/16).
         g: Θ / sin(Θ/2).
     """
@@ -152,7 +163,8 @@ class Middle:
         self.λ = stage(ufl.sqrt((1 + self.κ) / 2))
         self.y = stage((1 - self.λ) / 2)
         half = tuple(map(stage, scale(1 / (2 * self.κ), add(q1, q2))))
-        self.frame = tuple(tuple(map(stage, row)) for row in matrix(half))
+        self.turned = tuple(tuple(map(stage, row)) for row in turned(half))
+        self.frame = _plus_one(self.turned)
         series = SERIES[-1]
         for c in reversed(SERIES[:-1]):
             series = series * self.y + c
@@ -213,9 +225,9 @@ def forces_over_step(
     α = stage(-(o0 + o1) / 2 * Q * dλ - (P0 + P1) * dp * (o0 * o1))
     g = stage(P0 * o0 + P1 * o1)
     p = stages((α * dot(m, mean(old.r[1:], now.r[1:])), *scale(g, m)))
-    turned = stages(product(product(q1, p), conjugate(q2))[1:])
+    between = stages(product(product(q1, p), conjugate(q2))[1:])
     oμ = stages(scale(2 * h * over, μ))
-    ζ = stages(add(turned, cross(y[1:], oμ)))
+    ζ = stages(add(between, cross(y[1:], oμ)))
     sd, sμ, sζ = stages((dot(s, d), dot(s, oμ), dot(s, ζ)))
     X = stage((k / 2 + y[0] * k_) * sd)
     Y, Z, q = stages((γγ / 2 * sμ, k_ * sζ, (cc * σ) ** 2 * sd))
