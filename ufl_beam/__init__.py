@@ -89,6 +89,7 @@ from ufl_beam.model.joints import (
     Revolute,
     Rigid,
     RigidLink,
+    Spherical,
 )
 from ufl_beam.model.loads import (
     FollowerLoad,
@@ -203,6 +204,7 @@ __all__ = [
     "Slide",
     "Softening",
     "Solution",
+    "Spherical",
     "Spline",
     "Spring",
     "Static",

@@ -40,8 +40,8 @@ class _Short(reprlib.Repr):
 
 def at_point(point: Iterable[float]) -> str:
     """Return "(x, y)"; coordinates below 1e-12 m, as by round-off of arcs, are written as zero."""
-    x, y = (round(float(coordinate), 12) + 0.0 for coordinate in point)  # -0 + 0 is 0
-    return f"({x:g}, {y:g})"
+    rounded = (round(float(coordinate), 12) + 0.0 for coordinate in point)  # -0 + 0 is 0
+    return f"({', '.join(f'{x:g}' for x in rounded)})"
 
 
 _SHORT = _Short()

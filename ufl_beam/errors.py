@@ -419,6 +419,16 @@ def require_vector(value: Any, what: str) -> tuple[float, float]:
     return require_number(x, f"{what}[0]"), require_number(y, f"{what}[1]")
 
 
+def require_point(value: Any, what: str) -> tuple[float, ...]:
+    """Return ``value`` as two or three finite floats, or raise :class:`ArgumentError`."""
+    try:
+        if len(value) == 3 and not isinstance(value, str | bytes):
+            return tuple(require_number(x, f"{what}[{i}]") for i, x in enumerate(value))
+    except TypeError:
+        pass
+    return require_vector(value, what)
+
+
 def require_array(values: Any, what: str) -> npt.NDArray[np.float64]:
     """Return ``values`` as an array of finite numbers, or raise :class:`ArgumentError`."""
     try:

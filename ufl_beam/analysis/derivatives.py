@@ -222,6 +222,7 @@ class Case:
         """Return the scene for the values :attr:`at` with ``changes``."""
         scene = self._model(**{**self.at, **changes})
         require_kind(scene, Scene, f"{self._call}: the result of model")
+        scene.require_plane(self._call)
         return scene
 
     def begin_at_end_of(self, start: Derivatives) -> None:

@@ -78,6 +78,7 @@ class Linearization:
     def __init__(
         self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
+        scene.require_plane("modes, buckling and linear models")
         time = 0.0 if at is None else float(at.times[-1])
         if any(isinstance(load, MovingLoad) and load.mass for load in scene.loads):
             loads = [replace(x, mass=0.0) if isinstance(x, MovingLoad) else x for x in scene.loads]

@@ -185,6 +185,7 @@ def follow(
             f"follow: control = {control!r} must be ArcLength(...), LoadControl(...), "
             "DisplacementControl(...) or DissipationControl(...)"
         )
+    scene.require_plane("follow")
     control.require(scene)
     require_count(steps, "follow: steps")
     require_switch(progress, "follow: progress")

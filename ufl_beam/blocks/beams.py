@@ -310,11 +310,11 @@ def elastic_cells(
     numbers = [*stiffness, *axes(fields), *[alpha + scheme.alpha] * bool(scheme.alpha)]
     inelastic = numbering.inelastic_cells
     some = [x for x in strains if not np.isin(numbering.cells_of(x.beam), inelastic).all()]
-    statement = ElasticCell(fields.degree, _alike(scheme), functions_of(some))
+    statement = ElasticCell(fields.degree, alike(scheme), functions_of(some))
     return BeamCells(statement, "elastic cells", fields, setting, some, numbers)
 
 
-def _alike(scheme: Any) -> Any:
+def alike(scheme: Any) -> Any:
     """Return a scheme with a fixed ``alpha``, so that schemes share kernels."""
     chosen = scheme.alpha and "alpha" in getattr(scheme, "__dataclass_fields__", {})
     return replace(scheme, alpha=0.5) if chosen else scheme
@@ -341,7 +341,7 @@ class InelasticCells(BeamCells):
     ) -> None:  # fmt: skip
         numbering, degree = fields.subdomain.numbering, fields.degree
         some = [x for x in strains if np.isin(numbering.cells_of(x.beam), cells).any()]
-        statement = InelasticCell(degree, _alike(setting.scheme), functions_of(some))
+        statement = InelasticCell(degree, alike(setting.scheme), functions_of(some))
         name = f"cells with points {section_points.number}"
         shifts = np.zeros((3 * degree, len(fields.order)))
         super().__init__(statement, name, fields, setting, some, [*shifts, *axes(fields)])

@@ -125,7 +125,10 @@ class Block(LoadTerm):
         state: Views of the states by name, in batches, with copies of the last element; initially
             zero.
         dofs: Degrees of freedom on which loads act, on any process.
+        remembers: Whether a run that goes on needs the states of a load.
     """
+
+    remembers = False
 
     def __init__(
         self, statement: Statement, elements: Elements, setting: BlockSetting, *,

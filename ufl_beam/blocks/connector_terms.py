@@ -92,7 +92,11 @@ def connector_terms(setting: BlockSetting) -> list[Any]:
     of which it has connectors.
     """
     scheme, connectors, made = setting.scheme, setting.scene.all_connectors, list[Any]()
-    keys = [(_motions_with(connector), _kind(connector.law)) for connector in connectors]
+    kind_of_space = " in space" * setting.scene.in_space
+    keys = [
+        (tuple(motion + kind_of_space for motion in _motions_with(c)), _kind(c.law))
+        for c in connectors
+    ]
     for key, connector in dict(zip(keys, connectors, strict=True)).items():
         law, of_kind = connector.law, np.array([i for i, x in enumerate(keys) if x == key])
         if isinstance(law, Spring):

@@ -18,12 +18,23 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.nodes_in_space import (
+    UNKNOWNS,
+    change,
+    new_state,
+    quaternion,
+    quaternion_names,
+    unknowns,
+    vector,
+)
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.state_io import NOWHERE, Archive
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
+from ufl_beam.mechanics.spatial_kinematics import Turn
+from ufl_beam.mechanics.spatial_motions import SPATIAL_MOTIONS, GeometryInSpace, NodeInStep
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Controller
@@ -36,6 +47,9 @@ WITHOUT_PLACES = "turning", "guided"
 
 PLACES = [f"{vector} {c}" for vector in Geometry._fields for c in "xy"]
 """Names of the components of a :class:`Geometry`."""
+
+PLACES_IN_SPACE = [f"{vector} {c}" for vector in GeometryInSpace._fields for c in "xyz"]
+"""Names of the components of a :class:`GeometryInSpace`."""
 
 RECORDED = {
     "motion": lib.RECORDED_STATE, "work": lib.RECORDED_WORK, "rate": lib.RECORDED_STEP,
@@ -97,6 +111,17 @@ class OnConnector(Statement):
     nodes = 2
 
     @property
+    def in_space(self) -> bool:
+        """True for motions of :data:`SPATIAL_MOTIONS`."""
+        return self.motions[0] in SPATIAL_MOTIONS
+
+    @property
+    def unknowns(self) -> list[str]:
+        """See the base class."""
+        forces = [f"force{k}" for k in range(self.laws)]
+        return [*unknowns(2), *forces] if self.in_space else super().unknowns
+
+    @property
     def laws(self) -> int:
         """See the base class."""
         return len(self.motions)
@@ -117,13 +142,18 @@ class OnConnector(Statement):
     def numbers(self) -> list[str]:
         """Parameters of the law; geometry of each motion, if it depends on places."""
         moving = (k for k, motion in enumerate(self.motions) if motion not in WITHOUT_PLACES)
-        return [*self.data.numbers, *(f"{name} {k}" for k in moving for name in PLACES)]
+        places = PLACES_IN_SPACE if self.in_space else PLACES
+        return [*self.data.numbers, *(f"{name} {k}" for k in moving for name in places)]
 
     @property
     def state(self) -> list[str]:
-        """Forces at the end of the last step, if they are in the work of a step; variables."""
+        """Forces at the end of the last step, if they are in the work of a step; variables.
+
+        In space the quaternions of both nodes follow.
+        """
         before = bool(self.scheme.weight_of_before)
-        return [*(f"force {k}" for k in range(before * self.laws)), *self.data.variables]
+        turns = [x for k in range(2 * self.in_space) for x in quaternion_names(k)]
+        return [*(f"force {k}" for k in range(before * self.laws)), *self.data.variables, *turns]
 
     @property
     def recorded(self) -> dict[str, int]:
@@ -141,16 +171,12 @@ class OnConnector(Statement):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
-        virtual = [[ufl.variable(ufl.as_ufl(0.0)) for _ in COMPONENTS] for _ in range(self.nodes)]
-        w = Pair(*map(ufl.as_vector, virtual))
-        q0, q1 = (Pair(*at.motions(group)) for group in ("q0", "q1"))
+        components = UNKNOWNS if self.in_space else COMPONENTS
+        virtual = [[ufl.variable(ufl.as_ufl(0.0)) for _ in components] for _ in range(self.nodes)]
+        relative = self._in_space if self.in_space else self._in_plane
+        found, turned = relative(at, virtual)
         e0, e1, rates, variations = (list[Expr]() for _ in range(4))
-        for k, motion in enumerate(self.motions):
-            none, names = dict.fromkeys(PLACES, 0.0), [f"{name} {k}" for name in PLACES]
-            given = none.values() if motion in WITHOUT_PLACES else [at[name] for name in names]
-            geometry = Geometry(*map(ufl.as_vector, np.reshape([*given], (-1, 2)).tolist()))
-            before, _ = MOTIONS[motion](q0, q0, w, geometry, self.scheme)
-            now, variation = MOTIONS[motion](q0, q1, w, geometry, self.scheme)
+        for before, now, variation in found:
             e0.append(at.stage(before))
             nodal = self.unknowns[: -self.laws] if self.rates else ()
             slopes = (ufl.diff(before, at[f"q0 {x}"]) * at[f"rate1 {x}"] for x in nodal)
@@ -163,16 +189,43 @@ class OnConnector(Statement):
         works = [force * (now - before) for force, (before, now) in zip(mean, pairs, strict=True)]
         law = self.law(at, Step(e0, e1, λ, works, rates))
         work = sum((x * de for x, de in zip(λ, variations, strict=True)), 0)
-        forces = [ufl.diff(work, v[i]) for i in range(len(COMPONENTS)) for v in virtual]
+        forces = [ufl.diff(work, v[i]) for i in range(len(components)) for v in virtual]
         recorded = dict[str, Expr]()
         for k, ((before, now), work) in enumerate(zip(pairs, works, strict=True)):
             values = now, work, (now - before) / at["dt"]
             recorded |= {f"{x} {k}": value for x, value in zip(RECORDED, values, strict=True)}
-        state = {f"force {k}": x for k, x in enumerate(λ)} | {**law.state}
+        state = {f"force {k}": x for k, x in enumerate(λ)} | {**law.state} | turned
         return law._replace(
             forces=[*forces, *law.forces], state=state, motions=e1,
             recorded=recorded | {**law.recorded},
         )  # fmt: skip
+
+    def _in_plane(self, at: Inputs, virtual: Any) -> tuple[list[tuple[Expr, ...]], dict[str, Expr]]:
+        """Return each motion before and after the step and its variation; no further state."""
+        w, found = Pair(*map(ufl.as_vector, virtual)), []
+        q0, q1 = (Pair(*at.motions(group)) for group in ("q0", "q1"))
+        for k, motion in enumerate(self.motions):
+            none, names = dict.fromkeys(PLACES, 0.0), [f"{name} {k}" for name in PLACES]
+            given = none.values() if motion in WITHOUT_PLACES else [at[name] for name in names]
+            geometry = Geometry(*map(ufl.as_vector, np.reshape([*given], (-1, 2)).tolist()))
+            before, _ = MOTIONS[motion](q0, q0, w, geometry, self.scheme)
+            found.append((before, *MOTIONS[motion](q0, q1, w, geometry, self.scheme)))
+        return found, {}
+
+    def _in_space(self, at: Inputs, virtual: Any) -> tuple[list[tuple[Expr, ...]], dict[str, Expr]]:
+        """Return the same of motions in space; the state is the quaternions of the nodes."""
+        turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
+        u = ([vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1"))
+        a, b = [
+            NodeInStep(before, now, turn, tuple(w[:3]), tuple(w[3:]), self.scheme)
+            for before, now, turn, w in zip(*u, turns, virtual, strict=True)
+        ]
+        found = list[tuple[Expr, ...]]()
+        for k, motion in enumerate(self.motions):
+            given = np.reshape([at[f"{name} {k}"] for name in PLACES_IN_SPACE], (-1, 3))
+            geometry = GeometryInSpace(*map(tuple, given.tolist()))
+            found.append(SPATIAL_MOTIONS[motion](a, b, geometry, self.scheme))
+        return found, new_state(turns)
 
 
 @dataclass(frozen=True)
@@ -242,6 +295,12 @@ class Damped(OnConnector):
         return Equations([step.λ[0] - at["viscosity"] * rate], lost={"damping": step.work[0]})
 
 
+def geometry_of(c: Connector) -> list[float]:
+    """Return the numbers of a :class:`Geometry`, or of a :class:`GeometryInSpace`."""
+    found = [*c.arms[0], *c.arms[1], *c.apart, *c.axis]
+    return [*found, *(c.other or [0.0] * 3)] if len(c.apart) == 3 else found
+
+
 class ConnectorBlock(Block):
     """Connectors with the same statement.
 
@@ -271,13 +330,13 @@ class ConnectorBlock(Block):
         self.indices: Index = subdomain.connectors[mine]
         self.connectors: list[Connector] = [scene.all_connectors[i] for i in self.indices]
         dofs = subdomain.connector_dofs[mine].astype(np.int32)
-        self.forces_at: Index = dofs[:, 6]
+        self.forces_at: Index = dofs[:, -1]
         moving = [j for j, x in enumerate(statement.motions) if x not in WITHOUT_PLACES]
         of_kind = [scene.all_connectors[i] for i in all_connectors]
         numbers = [
             [*statement.values(self.connectors[i], setting)[0], *(
                 x for c in (self.connectors[i + j] for j in moving)
-                for x in (*c.arms[0], *c.arms[1], *c.apart, *c.axis)
+                for x in geometry_of(c)
             )]
             for i in range(0, len(mine), k)
         ]  # fmt: skip
@@ -286,7 +345,7 @@ class ConnectorBlock(Block):
         positions = np.searchsorted(all_connectors, self.indices)
         elements = Elements(
             statement.data.name or type(statement).__name__, self.indices[::k],
-            np.column_stack([dofs[::k, :6], self.forces_at.reshape(-1, k)]),
+            np.column_stack([dofs[::k, :-1], self.forces_at.reshape(-1, k)]),
             np.reshape(numbers, (len(numbers), len(statement.numbers))).T, in_time,
             {"wanted": positions} if in_time else {},
         )  # fmt: skip

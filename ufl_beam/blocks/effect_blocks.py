@@ -161,6 +161,7 @@ class EffectBlock(Block):
     """Effects of a user with one statement."""
 
     statement: Any  # `OfUser`
+    remembers = True
 
     @property
     def effect(self) -> str:

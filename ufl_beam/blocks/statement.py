@@ -440,10 +440,15 @@ class Kernels:
         """Replace intermediate numbers by their values in the tangent, which are numbers, too."""
         if not at.in_tangent:
             return slopes
-        others = {symbol: ufl.Coefficient(at.space(1))[0] for symbol in at.in_tangent}
-        values = expanded([*at.in_tangent.values()])
-        zip_ = zip(others.values(), values, strict=True)
-        at.stages += [(other, value, value, other) for other, value in zip_]
+        values = dict(zip(at.in_tangent, expanded([*at.in_tangent.values()]), strict=True))
+        others = dict[Expr, Expr]()
+        for _, value, _, symbol in [*at.stages]:  # later ones may depend on earlier ones
+            instead = values.get(symbol)
+            if instead is None and not others.keys().isdisjoint(unique_pre_traversal(value)):
+                (instead,) = with_shared_nodes([value], others)
+            if instead is not None:
+                others[symbol] = other = ufl.Coefficient(at.space(1))[0]
+                at.stages.append((other, instead, instead, other))
         return [*with_shared_nodes(slopes, others)]
 
     def _inputs(self, names: Sequence[str]) -> Inputs:

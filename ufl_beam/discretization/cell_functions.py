@@ -21,6 +21,7 @@ from ufl_beam.caches import cached_forms
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.keys import key_of
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.cells_in_space import mass_matrix_in_space
 from ufl_beam.discretization.compiled_forms import (
     InsertedForces,
     Pointwise,
@@ -265,6 +266,8 @@ def mass_forces(fields: Fields) -> InsertedForces:
 
 def mass_matrix(fields: Fields) -> Csr:
     """Assemble the mass matrix of the beams, the point masses and the bodies."""
+    if fields.subdomain.numbering.scene.in_space:
+        return mass_matrix_in_space(fields)
     subdomain, (function, numbers) = fields.subdomain, _of_mass(fields)
     M, masses = function.matrix(fields, *numbers), point_masses(subdomain.numbering.scene)
     nodes = [subdomain.numbering.node(place) for place, *_ in masses]

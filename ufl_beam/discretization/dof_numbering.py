@@ -40,6 +40,9 @@ from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.works import Effect
 
+IN_SPACE = "u", "v", "w", "rotation about x", "rotation about y", "rotation about z"
+"""Names of the degrees of freedom of a node in space; its axes turn with it."""
+
 
 class DofNumbering:
     """Vertices, cells and degrees of freedom of a scene.
@@ -60,6 +63,8 @@ class DofNumbering:
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of ``scene.rigid_bodies``; shape (num_bodies, 3).
         multipliers: Numbers of the forces of connectors (Lagrange multipliers); (num_connectors,).
+        displacements, width: Numbers of displacements and of degrees of freedom of a node: 2 and 3
+            in the plane, 3 and 6 in space.
         size: Number of degrees of freedom, including the forces of connectors.
         cells_at_hinges: Cell at each plastic hinge of zero length; shape (num_hinges,).
         vertices_at_hinges: First vertex at each of these hinges; shape (num_hinges,).
@@ -70,6 +75,12 @@ class DofNumbering:
         mesh = DEFAULT_MESH if mesh is None else mesh
         require_kind(mesh, Mesh, "mesh")
         self.scene, self.mesh, beams = scene, mesh, scene.beams
+        if scene.in_space and (mesh.degree, mesh.lumped) != (1, False):
+            raise ModelError(
+                f"{mesh!r}: cells of beams in space have degree 1 and a consistent mass; give "
+                "more of them"
+            )
+        self.displacements, self.width = (3, 6) if scene.in_space else (2, 3)
         self._beam_indices: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
         self._parameters: list[Array] = []
         by_kind: dict[object, Array] = {}  # beams with equal cells share parameters
@@ -81,23 +92,23 @@ class DofNumbering:
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
-        vertices = points_along([beam.curve for beam in beams], self._parameters)
+        curves = [beam.curve for beam in beams]
+        vertices = points_along(curves, self._parameters, 3 if scene.in_space else 2)
         begins = np.ones(len(vertices), dtype=bool)
         begins[self.first_vertices[1:] - 1] = False
         begin = np.flatnonzero(begins)
         self.beam_of_cell = np.repeat(np.arange(len(beams), dtype=np.int32), counts - 1)
         inner, starts, ends = mesh.nodes[1:-1], vertices[begin], vertices[begin + 1]
         between = starts[:, None] + inner[:, None] * (ends - starts)[:, None]
-        self.points = np.concatenate([vertices, between.reshape(-1, 2)])
+        self.points = np.concatenate([vertices, between.reshape(-1, vertices.shape[1])])
         self.nodes_of_cells: Index = np.empty((len(begin), mesh.degree + 1), dtype=np.int32)
         self.nodes_of_cells[:, 0], self.nodes_of_cells[:, 1] = begin, begin + 1
         inside = np.arange(len(vertices), len(self.points))
         self.nodes_of_cells[:, 2:] = inside.reshape(between.shape[:2])
         self.cells = self.nodes_of_cells[:, :2]
         for cell in np.flatnonzero(self.lengths(np.arange(len(begin))) <= 1e-12 * scene.size)[:1]:
-            x, y = self.points[self.cells[cell, 0]]
-            name = beams[self.beam_of_cell[cell]].name
-            raise ModelError(f"{name}: zero length of a cell at ({x:g}, {y:g})")
+            name, at = beams[self.beam_of_cell[cell]].name, self.points[self.cells[cell, 0]]
+            raise ModelError(f"{name}: zero length of a cell at {at_point(at)}")
         self._add_hinges(scene.hinges)
         self._number()
         scene.free_caches()
@@ -137,10 +148,14 @@ class DofNumbering:
         def at(carrier: Node) -> int:
             return row[carrier] if isinstance(carrier, Body) else self.vertex(carrier)
 
-        slots = np.arange(3 * (nodes + len(rigid_bodies)))
-        shared = slots >= 3 * nodes
-        same = self.scene.representatives.items()
-        pairs = [(3 * at(first) + c, 3 * at(second) + c) for (first, c), (second, _) in same]
+        width = self.width
+        slots = np.arange(width * (nodes + len(rigid_bodies)))
+        shared = slots >= width * nodes
+        pairs = [
+            (width * at(first) + k, width * at(second) + k)
+            for (first, c), (second, _) in self.scene.representatives.items()
+            for k in self.components(c)
+        ]
         ones, others = np.reshape(np.array(pairs, dtype=np.int64), (-1, 2)).T
         slots[ones] = others
         shared[others] = True
@@ -149,17 +164,24 @@ class DofNumbering:
         position = np.arange(nodes + len(rigid_bodies), dtype=np.float64)
         position[list(self.beyond.values())] = self.vertices_at_hinges
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
-        ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
+        ordered = (width * np.argsort(position)[:, None] + np.arange(width)).ravel()
         groups = independent & ~shared, independent & shared
         order = np.concatenate([ordered[group[ordered]] for group in groups])
         number = np.empty(len(slots), dtype=np.int32)
         number[order] = np.arange(len(order))
-        dofs = number[slots].reshape(-1, 3)
+        dofs = number[slots].reshape(-1, width)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
         # Forces of connectors are last: their diagonal entries may be zero before the motions of
         # the connected nodes are eliminated.
         self.multipliers: Index = len(order) + np.arange(len(self.scene.all_connectors))
         self.size = len(order) + len(self.multipliers)
+
+    def components(self, component: int) -> tuple[int, ...]:
+        """Return the degrees of freedom of a node for a component of :data:`COMPONENTS`.
+
+        In space the first component stands for all displacements, and the last for all rotations.
+        """
+        return {0: (0, 1, 2), 1: (), 2: (3, 4, 5)}[component] if self.width == 6 else (component,)
 
     def agrees(self, numbering: DofNumbering) -> bool:
         """Return whether ``numbering`` has the same beams, points and degrees of freedom."""
@@ -277,8 +299,8 @@ class DofNumbering:
     def lengths(self, cells: Index) -> Array:
         """Compute lengths of cells; (len(cells),); m."""
         start, end = self.cells[cells].T
-        x, y = (self.points[end] - self.points[start]).T
-        return np.asarray(np.sqrt(x * x + y * y))
+        x, y, *z = (self.points[end] - self.points[start]).T
+        return np.asarray(np.sqrt(sum((c * c for c in z), x * x + y * y)))
 
     @cached_property
     def axis_angles(self) -> Array:
@@ -382,7 +404,7 @@ class DofNumbering:
     def nodes_of(self, member: Member | Body) -> tuple[Array, Index]:
         """Return points (m) and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3)."""
         if isinstance(member, Body):
-            return np.array([member.center]), self.node(member.middle).reshape(1, 3)
+            return np.array([member.center]), self.node(member.middle)[None]
         nodes = self._beam_nodes(member)
         return self.points[nodes], self.dofs[nodes]
 
@@ -402,7 +424,10 @@ class DofNumbering:
     @cached_property
     def rotations(self) -> Index:
         """Rotational degrees of freedom, each once, ascending."""
-        return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
+        first = self.displacements
+        return np.unique(
+            np.r_[self.dofs[:, first:].ravel(), self.dofs_of_bodies[:, first:].ravel()]
+        )
 
     @property
     def scales(self) -> Array:
@@ -422,8 +447,9 @@ class DofNumbering:
         The order is u of both nodes, v of both nodes, ψ of both nodes, and the force.
         """
         connectors = self.scene.all_connectors
-        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in connectors]).reshape(-1, 2, 3)
-        both = nodes.transpose(0, 2, 1).reshape(-1, 6)
+        shape = -1, 2, self.width
+        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in connectors]).reshape(shape)
+        both = nodes.transpose(0, 2, 1).reshape(-1, 2 * self.width)
         return np.column_stack([both, self.multipliers]).astype(np.int64)
 
     @cached_property
@@ -438,16 +464,21 @@ class DofNumbering:
             for i, effect in effects.items() if effect.places
         }  # fmt: skip
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the degrees of freedom of a node in messages."""
+        return IN_SPACE if self.width == 6 else COMPONENTS
+
     def describe(self, dof: int) -> str:
         """Describe a degree of freedom by its component and beam or body, or by its connector."""
         if dof in self.multipliers:
             return f"force of {self.scene.all_connectors[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
-            return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
+            return f"{self.names[component]} of {self.scene.rigid_bodies[body].name}"
         node, component = np.argwhere(self.dofs == dof)[0]
         beam = next(b for b in self.scene.beams if node in self._beam_nodes(b))
-        return f"{COMPONENTS[component]} of {beam.name} at {at_point(self.points[node])}"
+        return f"{self.names[component]} of {beam.name} at {at_point(self.points[node])}"
 
     def describe_cell(self, number: int) -> str:
         """Describe a cell by its beam and its middle."""
@@ -482,7 +513,7 @@ def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) 
     """Return values at the centre of a body, or interpolated at a place of a beam; (n, 3)."""
     if isinstance(place, BodyPoint):
         if node(place) is GROUND:
-            return np.zeros((len(states), 3))
+            return np.zeros((len(states), numbering.width))
         dofs = numbering.node(place)
         return np.ascontiguousarray(states[:, dofs])
     nodes, weights = numbering.weights(place)

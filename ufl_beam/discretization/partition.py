@@ -74,7 +74,10 @@ class Subdomain:
             owner[numbering.dofs[numbering.nodes_of_cells[cell_ranks == rank]]] = rank
         self.cells = np.flatnonzero(cell_ranks == comm.rank).astype(np.int32)
         cell_dofs = numbering.dofs[numbering.nodes_of_cells[self.cells]].transpose(0, 2, 1)
-        cell_dofs = cell_dofs.reshape(len(self.cells), 3 * (numbering.mesh.degree + 1))
+        cell_dofs = cell_dofs.reshape(
+            len(self.cells),
+            -1 if len(self.cells) else numbering.width * (numbering.mesh.degree + 1),
+        )
         hinge_dofs, hinge_cells = (
             numbering.dofs[numbering.vertices_at_hinges],
             numbering.cells_at_hinges,
@@ -135,6 +138,11 @@ class Subdomain:
         place = np.searchsorted(self.cells, cell := self.numbering.cell(point))
         return bool(np.any(self.cells[place : place + 1] == cell))
 
+    @property
+    def plane_rotations(self) -> Index:
+        """Rotations in the plane; none in space, where unknowns are Cayley vectors."""
+        return self.rotations[: 0 if self.numbering.scene.in_space else None]
+
     def translations(self) -> tuple[Index, Index]:
         """Return the local numbers of u, and of v, of all nodes and bodies on this process."""
         numbering = self.numbering
@@ -149,7 +157,8 @@ class Subdomain:
         Displacements change by the length of a cell, or at bodies by the size of the scene.
         """
         lengths = np.full(self.size, self.numbering.scene.size)
-        displacements = self.cell_dofs[:, : 2 * (self.numbering.mesh.degree + 1)]
+        moving = self.numbering.displacements * (self.numbering.mesh.degree + 1)
+        displacements = self.cell_dofs[:, :moving]
         lengths[displacements] = self.numbering.lengths(self.cells)[:, None]
         lengths[self.rotations] = 1.0
         lengths[self.multipliers] = 0.0

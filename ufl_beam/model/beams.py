@@ -10,7 +10,7 @@ from fractions import Fraction
 from functools import cached_property, partial
 from itertools import accumulate, pairwise
 from numbers import Rational, Real
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,7 @@ from ufl_beam.model.checks import (
     require_count,
     require_kind,
     require_number,
+    require_point,
     require_sequence,
     require_vector,
 )
@@ -52,10 +53,14 @@ class Beam(Record, Member):
             :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  A hinge is
             rigid until its moment reaches the limit of the law.  At an end of the beam, the law
             replaces ``Section(hinge=)``, and ``None`` removes the hinge of the section.
+        up: In space, a vector in the plane of the axes 1 and 2 of the section: axis 1 is along the
+            beam, axis 2 is the part of ``up`` across it, and axis 3 is normal to both.  By default
+            ``(0, 0, 1)``.
 
     Raises:
-        ModelError: Zero length, ``cells < 1``, coordinates that are not finite, corners or hinges
-            outside the beam, hinges with a section of fibres, or a curve that misses an end.
+        ModelError: Zero length, ``up`` along the beam, ``cells < 1``, coordinates that are not
+            finite, corners or hinges outside the beam, hinges with a section of fibres, or a curve
+            that misses an end.
 
     Example:
         >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
@@ -71,14 +76,22 @@ class Beam(Record, Member):
     curve: Curve
     corners: Annotated[tuple[float, ...], require_sequence]
     hinges: Annotated[Mapping[float, HingeLaw | None], partial(require_kind, kind=Mapping)]
+    up: tuple[float, ...] | None
 
     def __init__(
         self, start: Point, end: Point, section: Section, *, cells: int = 8, name: str = "beam",
         curve: Curve | None = None, corners: Sequence[float] = (),
-        hinges: Mapping[float, HingeLaw | None] = {},
+        hinges: Mapping[float, HingeLaw | None] = {}, up: Sequence[float] | None = None,
     ) -> None:  # fmt: skip
-        ends = require_vector(start, f"{name}: start"), require_vector(end, f"{name}: end")
-        values = (ends, section, cells, name, curve, corners, hinges)
+        ends = require_point(start, f"{name}: start"), require_point(end, f"{name}: end")
+        if len(ends[0]) != len(ends[1]):
+            raise ModelError(
+                f"{name}: the start {ends[0]} and the end {ends[1]} must both have two coordinates "
+                "in the plane, or three in space"
+            )
+        if up is None and len(ends[0]) == 3:
+            up = 0.0, 0.0, 1.0
+        values = (ends, section, cells, name, curve, corners, hinges, up)
         for field, value in zip(fields(self), values, strict=True):
             object.__setattr__(self, field.name, value)
         self.__post_init__()
@@ -101,9 +114,11 @@ class Beam(Record, Member):
             at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
             points = [curve_point(self.curve, s, f"{self.name}: curve") for s in at]
             for s, point, end in zip((0, 1), (points[0], points[-1]), self.ends, strict=True):
-                if math.dist(point, end) > 1e-9 * max(math.hypot(*point), math.hypot(*end)):
+                size = max(math.hypot(*point), math.hypot(*end))
+                if len(point) != len(end) or math.dist(point, end) > 1e-9 * size:
                     raise ModelError(f"{self.name}: curve({s}) = {point} is not the end {end}")
             length = sum(math.dist(p, q) for p, q in pairwise(points))
+        self._require_up()
         depth = self.section.depth
         if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is depth / sqrt(12)
             warn(
@@ -112,6 +127,25 @@ class Beam(Record, Member):
                 "mm? Units are SI: m, N, N m². If EI is large on purpose, give the section its "
                 "depth"
             )
+
+    def _require_up(self) -> None:
+        """Raise :class:`ModelError` unless ``up`` gives each cell its axes."""
+        if self.up is None:
+            return
+        up = require_point(self.up, f"{self.name}: up")
+        object.__setattr__(self, "up", up)
+        if len(self.ends[0]) == 2 or len(up) == 2:
+            raise ModelError(
+                f"{self.name}: up = {up} gives axes to sections in space, so that ends of the beam "
+                "and up have three coordinates"
+            )
+        points = [np.array(self.curve(i / self.cells)) for i in range(self.cells + 1)]
+        for a, b in pairwise(points):
+            if np.linalg.norm(np.cross(b - a, up)) <= 1e-9 * math.hypot(*(b - a)) * math.hypot(*up):
+                raise ModelError(
+                    f"{self.name}: up = {up} is along the beam; give a vector across it, which "
+                    "becomes axis 2 of the section"
+                )
 
     def _require_hinges(self) -> None:
         """Raise :class:`ModelError` unless places and laws of the hinges suit the beam."""
@@ -164,10 +198,11 @@ class Beam(Record, Member):
     def polyline(
         cls, points: Sequence[Point], section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
+        up: Sequence[float] | None = None,
     ) -> Beam:  # fmt: skip
         """Create a beam of straight pieces through points (m); ``s`` is the fraction of length."""
         points = require_sequence(points, f"{name}: points")
-        xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
+        xy: list[Any] = [require_point(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
             raise ModelError(f"{name}: a polyline needs at least two points, not {len(xy)}")
         lengths = [math.dist(p, q) for p, q in pairwise(xy)]
@@ -178,17 +213,18 @@ class Beam(Record, Member):
         at = tuple(end / ends[-1] for end in ends)
         return cls(
             xy[0], xy[-1], section, cells=cells, name=name, curve=Polyline(tuple(xy), at),
-            corners=at[1:-1], hinges=hinges,
+            corners=at[1:-1], hinges=hinges, up=up,
         )  # fmt: skip
 
     @classmethod
     def along(
         cls, curve: Curve, section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
+        up: Sequence[float] | None = None,
     ) -> Beam:  # fmt: skip
         """Create a beam along any curve ``s -> (x, y)`` (m), with ``s`` from 0 to 1."""
         a, b = (curve_point(curve, s, f"{name}: curve") for s in (0.0, 1.0))
-        return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges)
+        return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges, up=up)
 
 
 # -- discretization -----------------------------------------------------------------------------

@@ -17,13 +17,20 @@ from ufl_beam.display import at_point, bracketed
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.checks import (
     require_all,
+    require_array,
     require_kind,
     require_number,
+    require_point,
     require_switch,
-    require_vector,
 )
 from ufl_beam.model.functions import Curve, Point, tangent_within
-from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
+from ufl_beam.model.records import (
+    NotNegative,
+    Record,
+    Text,
+    VectorOfScene,
+    require_moment,
+)
 
 TOGETHER = 1e-9  # largest distance at which two places of a beam coincide, as a fraction of a cell
 
@@ -111,8 +118,7 @@ class Place:
     @property
     def point(self) -> Point:
         """Coordinates in the undeformed scene; m."""
-        x, y = self.beam.curve(self.s)
-        return float(x), float(y)
+        return tuple(map(float, self.beam.curve(self.s)))  # type: ignore[return-value]
 
     @property
     def direction(self) -> Point:
@@ -123,14 +129,32 @@ class Place:
             for low, high in pairwise(edges)
             if low <= self.s <= high
         ]
-        x, y = sum((side / math.hypot(*side) for side in sides), np.zeros(2))
-        length = math.hypot(x, y)
-        return float(x / length), float(y / length)
+        first, *others = (side / math.hypot(*side) for side in sides)
+        whole = sum(others, first)
+        return tuple(map(float, whole / math.hypot(*whole)))  # type: ignore[return-value]
 
     def __str__(self) -> str:
         ends = {0.0: "start", 1.0: "end"}
         name = f"{self.beam.name}.{ends.get(self.s, f'at({self.s:g})')} {at_point(self.point)}"
         return f"{name} beyond the hinge" if self.beyond else name
+
+
+def require_inertia_of_body(value: Any, what: str) -> Any:
+    """Return the inertia of a body: a number, or moments or a tensor in space."""
+    if np.ndim(value) == 0:
+        return require_number(value, what, at_least=0.0)
+    given = require_array(value, what)
+    tensor = np.diag(given) if given.shape == (3,) else given
+    if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T, rtol=1e-12):
+        raise ModelError(f"{what} must be three moments, or a symmetric 3 x 3 matrix")
+    a, b, c = np.linalg.eigvalsh(tensor)
+    if a < -1e-12 * c or c > (a + b) * (1 + 1e-9):
+        raise ModelError(
+            f"{what} has the principal moments {a:.6g}, {b:.6g}, {c:.6g} kg m²; no body has them: "
+            "none is negative, and the largest is at most the sum of the others"
+        )
+    rows: Any = tensor.tolist()
+    return tuple(map(tuple, rows)) if given.ndim == 2 else tuple(map(float, given))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +164,8 @@ class Body(Record):
     Args:
         center: Centre of mass in the undeformed scene; m.
         mass: Mass; kg.
-        inertia: Moment of inertia about the centre of mass; kg m².
+        inertia: Moment of inertia about the centre of mass; in space the moments about axes along
+            x, y and z of the undeformed scene, or a symmetric 3 x 3 matrix; kg m².
         name: Name in messages and pictures.
 
     Raises:
@@ -153,18 +178,33 @@ class Body(Record):
         Revolute(beam.end (2, 0), rotor (2, 0))
     """
 
-    center: Vector
+    center: VectorOfScene
     _: KW_ONLY
     mass: NotNegative = 0.0
-    inertia: NotNegative = 0.0
+    inertia: Annotated[Any, require_inertia_of_body] = 0.0
     name: Text = "body"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.ndim(self.inertia) and len(self.center) == 2:
+            raise ModelError(f"{self.name}: inertia in the plane is a number")
+
+    @property
+    def tensor(self) -> tuple[tuple[float, ...], ...]:
+        """Tensor of inertia in space; kg m²."""
+        given = np.asarray(self.inertia, dtype=float)
+        rows: Any = given if given.ndim == 2 else given * np.eye(3)
+        return tuple(tuple(map(float, row)) for row in rows)
 
     def _label(self) -> str:
         return self.name
 
-    def at(self, x: float, y: float) -> BodyPoint:
-        """Return the point of the body that is at (x, y) in the undeformed scene; m."""
-        return BodyPoint(self, (x, y))
+    def at(self, x: float, y: float, *z: float) -> BodyPoint:
+        """Return the point of the body that is at (x, y) in the undeformed scene; m.
+
+        In space it has a third coordinate.
+        """
+        return BodyPoint(self, (x, y, *z))  # type: ignore[arg-type]
 
     @property
     def middle(self) -> BodyPoint:
@@ -194,7 +234,12 @@ class BodyPoint:
 
     def __post_init__(self) -> None:
         require_kind(self.body, Body, "BodyPoint: body")
-        point = require_vector(self.point, f"{self.body.name}.at(x, y)")
+        point = require_point(self.point, f"{self.body.name}.at(x, y)")
+        if self.body is not GROUND and len(point) != len(self.body.center):
+            raise ModelError(
+                f"{self.body.name}.at{point}: the centre has {len(self.body.center)} coordinates; "
+                "give as many"
+            )
         object.__setattr__(self, "point", point)
 
     def __str__(self) -> str:
@@ -205,14 +250,14 @@ GROUND = Body((0.0, 0.0), name="ground")
 """The body that does not move."""
 
 
-def ground(x: float, y: float) -> BodyPoint:
-    """Return the point (x, y) of the ground; m.
+def ground(x: float, y: float, *z: float) -> BodyPoint:
+    """Return the point (x, y), in space (x, y, z), of the ground; m.
 
     Example:
         >>> pivot = ub.Revolute(ub.ground(0, 0), beam.start)
         >>> pendulum = ub.Scene([beam], joints=[pivot], loads=[ub.Gravity()])
     """
-    return BodyPoint(GROUND, (x, y))
+    return BodyPoint(GROUND, (x, y, *z))  # type: ignore[arg-type]
 
 
 AttachmentPoint = Place | BodyPoint
@@ -246,7 +291,7 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
 
     for group in groups:
         indices = [
-            3 * number.setdefault(moved, len(number)) + component for moved, component in group
+            6 * number.setdefault(moved, len(number)) + component for moved, component in group
         ]
         dofs.update(zip(indices, group, strict=True))
         for x in indices[1:]:
@@ -272,15 +317,15 @@ def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     The vector is zero for points of the ground, which do not move.
     """
     if node(place) is GROUND or (point is None and isinstance(place, Place)):
-        return 0.0, 0.0
-    x, y = point or place.point
-    nx, ny = place.body.center if isinstance(place, BodyPoint) else place.point
-    return x - nx, y - ny
+        return (0.0,) * len(place.point)  # type: ignore[return-value]
+    at = point or place.point
+    of_node = place.body.center if isinstance(place, BodyPoint) else place.point
+    return tuple(x - n for x, n in zip(at, of_node, strict=True))
 
 
 def moves_with_node(place: AttachmentPoint) -> bool:
     """Return whether a place always has the displacement of its node."""
-    return arm(place) == (0.0, 0.0)
+    return not any(arm(place))
 
 
 def require_place(place: Any, what: str) -> None:
@@ -346,7 +391,7 @@ class Velocity(Record):
     Args:
         beams: The beams and bodies with this velocity.
         linear: Velocity of the point ``about``; m/s.
-        angular: Angular velocity; rad/s.
+        angular: Angular velocity, in space a vector; rad/s.
         about: Point of the undeformed scene, by default the origin; m.
 
     Example:
@@ -356,16 +401,19 @@ class Velocity(Record):
     """
 
     beams: Annotated[tuple[Member | Body, ...], partial(require_all, kind=(Member, Body))]
-    linear: Vector = (0.0, 0.0)
-    angular: Number = 0.0
-    about: Annotated[Point | None, require_vector] = None
+    linear: VectorOfScene = (0.0, 0.0)
+    angular: Annotated[Any, require_moment] = 0.0
+    about: Annotated[Any, require_point] = None
 
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""
         return map(base_of, self.beams)
 
-    def at(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
+    def at(self, x: float, y: float, *z: float) -> tuple[float, ...]:
+        """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s; in space six rates."""
+        if z:
+            arm = np.array([x, y, *z]) - (self.about or (0.0, 0.0, 0.0))
+            return *(np.array(self.linear) + np.cross(self.angular, arm)), *self.angular
         about_x, about_y = self.about or (0.0, 0.0)
         return (
             self.linear[0] - self.angular * (y - about_y),

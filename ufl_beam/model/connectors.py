@@ -11,6 +11,8 @@ from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from typing import Annotated, Any
 
+import numpy as np
+
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
@@ -23,7 +25,7 @@ from ufl_beam.model.bodies import (
     merged,
     node,
 )
-from ufl_beam.model.checks import require_kind, require_vector
+from ufl_beam.model.checks import require_kind, require_point
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic, Spring
 from ufl_beam.model.functions import Point, TimeFunction
@@ -54,6 +56,8 @@ class Connector(Record, ABC):
         a, b: The places.
         law: Law of the force.
         axis: Unit vector, for motions along an axis.
+        other: In space, a unit vector that is fixed in ``b``, for the motion "aligning"; zero for
+            others.
         corner: Point that moves with the node of ``a`` and replaces place a in the motion, or None.
         name: Name in results and messages, by default made of the class and the places.
         component: Index of the motion in the law of a :class:`Bushing`, otherwise 0.
@@ -75,6 +79,7 @@ class Connector(Record, ABC):
     b: PlaceField
     law: LawField
     axis: Point = (1.0, 0.0)
+    other: tuple[float, ...] = ()
     corner: Point | None = None
     name: str = ""
     component: int = 0
@@ -118,13 +123,13 @@ class Connector(Record, ABC):
     @property
     def apart(self) -> Point:
         """Vector from ``corner`` or place a to place b in the undeformed scene; m."""
-        (ax, ay), (bx, by) = self.corner or self.a.point, self.b.point
-        return bx - ax, by - ay
+        pairs = zip(self.corner or self.a.point, self.b.point, strict=True)
+        return tuple(b - a for a, b in pairs)  # type: ignore[return-value]
 
     @property
     def is_rotation(self) -> bool:
         """True if the motion is a rotation, in rad and N m instead of m and N."""
-        return self.motion == "turning"
+        return self.motion in ("turning", "aligning")
 
     @property
     def stretches(self) -> bool:
@@ -137,7 +142,12 @@ class Connector(Record, ABC):
         return self.motion == "sliding"
 
     def rigidly(self) -> tuple[Factors, Factors]:
-        """Return the derivatives of the motion by (u, v, ψ) of both nodes, undeformed."""
+        """Return the derivatives of the motion by (u, v, ψ) of both nodes, undeformed.
+
+        In space they are derivatives by the displacement and the rotation about x, y and z.
+        """
+        if len(self.apart) == 3:
+            return self._rigidly_in_space()
         if self.is_rotation:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
@@ -147,10 +157,23 @@ class Connector(Record, ABC):
         # If the axis turns with a, d(axis·d)/dψ = (W axis)·d = -y dx + x dy
         return (-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by)
 
+    def _rigidly_in_space(self) -> tuple[Any, Any]:
+        n, (arm_a, arm_b) = np.array(self.axis), self.arms
+        if self.stretches:
+            n = np.array(self.apart) / math.hypot(*self.apart)
+        if self.is_rotation:
+            torque = n if self.motion == "turning" else np.cross(self.other, n)
+            return (0.0, 0.0, 0.0, *-torque), (0.0, 0.0, 0.0, *torque)
+        with_a = np.cross(n, self.apart) if self.follows_a else np.zeros(3)
+        return (*-n, *(with_a - np.cross(arm_a, n))), (*n, *np.cross(arm_b, n))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Turn(Connector):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
+
+    In space, the motion is the component of the rotation vector along an ``axis`` that is fixed in
+    both places, up to 180 degrees.
 
     Example:
         >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad
@@ -163,8 +186,17 @@ class Turn(Connector):
     b: PlaceField
     law: LawField
     _: KW_ONLY
+    axis: Any = None
     name: Text = ""
     motion = "turning"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        in_space = len(self.a.point) == 3
+        if in_space != (self.axis is not None):
+            raise ModelError(f"{self}: in space give axis=(x, y, z); in the plane there is none")
+        axis = unit_axis(self.a, self.b, self.axis, "Turn") if in_space else (1.0, 0.0)
+        object.__setattr__(self, "axis", axis)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -295,6 +327,7 @@ class Component(Connector):
     corner: Point | None = None
     component: int = 0
     name: str = ""
+    other: tuple[float, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -308,17 +341,34 @@ UNIT_TOLERANCE = 4 * sys.float_info.epsilon
 
 def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
     """Return the unit vector along ``axis``, by default along the line from ``a`` to ``b``."""
-    (ax, ay), (bx, by) = a.point, b.point
-    x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
-    length = math.hypot(x, y)
+    along = tuple(y - x for x, y in zip(a.point, b.point, strict=True))
+    given: Any = along if axis is None else require_point(axis, f"{kind}: axis")
+    if len(given) != len(along):
+        raise ModelError(
+            f"{kind}({a}, {b}): axis = {given} must have {len(along)} components, as the points"
+        )
+    length = math.hypot(*given)
     if length == 0.0:
         raise ModelError(
             f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
             "undeformed scene"
         )
     if abs(length - 1.0) <= UNIT_TOLERANCE:  # axes from files must not change
-        return x, y
-    return x / length, y / length
+        return tuple(given)
+    return tuple(x / length for x in given)
+
+
+def axes_of(point: Sequence[float]) -> list[tuple[float, ...]]:
+    """Return the unit vectors along the axes of the plane, or of space."""
+    return [tuple(float(i == k) for i in range(len(point))) for k in range(len(point))]
+
+
+def across(axis: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return two unit vectors in space that are normal to a unit vector, and to each other."""
+    n = np.array(axis)
+    p = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    p /= np.linalg.norm(p)
+    return tuple(p.tolist()), tuple(np.cross(n, p).tolist())
 
 
 def require_apart(connector: Connector) -> None:

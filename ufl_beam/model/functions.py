@@ -23,6 +23,7 @@ from ufl_beam.errors import ModelError, NoNumber, closed, shorten
 from ufl_beam.model.checks import (
     require_function,
     require_number,
+    require_point,
     require_returned,
     require_sequence,
     require_vector,
@@ -194,7 +195,7 @@ class Spline(GuideCurve):
 
 def between(p: Point, q: Point, s: float) -> Point:
     """Return the point at the fraction ``s`` of the line from ``p`` to ``q``; exact at the ends."""
-    return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s
+    return tuple(a * (1 - s) + b * s for a, b in zip(p, q, strict=True))  # type: ignore[return-value]
 
 
 def curve_point(curve: Curve, s: float, what: str) -> Point:
@@ -204,16 +205,18 @@ def curve_point(curve: Curve, s: float, what: str) -> Point:
         point = curve(s)
     except Exception as error:
         raise ModelError(f"{what}({s:g}) fails: {shorten(error)}") from error
-    return require_vector(point, f"{what}({s:g})")
+    return require_point(point, f"{what}({s:g})")  # type: ignore[return-value]
 
 
-def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:
-    """Return the points of each curve at its own parameters, curve by curve; (n, 2); m."""
-    ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * 4 for c in curves]
+def points_along(
+    curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array], d: int = 2
+) -> Array:
+    """Return the points of each curve at its own parameters, curve by curve; (n, d); m."""
+    ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * (2 * d) for c in curves]
     counts = [len(s) for s in parameters]
     s = np.concatenate([np.empty(0), *parameters])
-    segments = np.repeat(np.reshape(ends, (-1, 4)), counts, axis=0)
-    points: Array = segments[:, :2] * (1 - s)[:, None] + segments[:, 2:] * s[:, None]
+    segments = np.repeat(np.reshape(ends, (-1, 2 * d)), counts, axis=0)
+    points: Array = segments[:, :d] * (1 - s)[:, None] + segments[:, d:] * s[:, None]
     first = np.append(0, np.cumsum(counts, dtype=np.int64))
     for i, curve in enumerate(curves):
         if not isinstance(curve, Straight):
@@ -234,27 +237,32 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
 
 
 def enclosing_diameter(points: Array) -> float:
-    """Return the diameter of the smallest circle around points, (n, 2); m.
+    """Return the diameter of the smallest circle or sphere around points, (n, 2 or 3); m.
 
     The diameter does not depend on the coordinate axes.  The circle goes through two or three
-    points.  The farthest point outside is included next, until no point is outside.
+    points, the sphere through up to four.  The farthest point outside is included next, until no
+    point is outside.
     """
+
+    def lengths(x: Array) -> Array:
+        return np.asarray(np.hypot(*x.T) if x.shape[1] == 2 else np.linalg.norm(x, axis=1))
+
     points = points - points.mean(axis=0)
-    distances = np.hypot(*points.T)
+    distances = lengths(points)
     slack, chosen = 1e-12 * float(distances.max()), [int(np.argmax(distances))]
     center, radius = points[chosen[0]], 0.0
     while True:
-        distances = np.hypot(*(points - center).T)
+        distances = lengths(points - center)
         outside = int(np.argmax(distances))
         if distances[outside] <= radius + slack:
             return 2 * radius
         few, circles = [*chosen, outside], []
-        for through in (*combinations(few, 2), *combinations(few, 3)):
+        for through in (x for n in range(2, points.shape[1] + 2) for x in combinations(few, n)):
             first, *others = points[list(through)]
             ways = np.array(others) - first
             # The centre is equidistant from all points, in least squares if they are collinear.
             middle = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
-            reach = float(np.hypot(*(points[few] - middle).T).max())
+            reach = float(lengths(points[few] - middle).max())
             circles.append((reach, list(through), middle))
         larger, chosen, center = min(circles, key=lambda circle: circle[0])
         if larger <= radius:  # only round-off is left

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
@@ -25,7 +25,14 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_function, require_vector
 from ufl_beam.model.connector_laws import RIGID, Bearing, Guide
-from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
+from ufl_beam.model.connectors import (
+    Component,
+    Connector,
+    across,
+    axes_of,
+    require_apart,
+    unit_axis,
+)
 from ufl_beam.model.functions import Curve, Point, guide_curve
 from ufl_beam.model.records import Instance, Record, Switch, Text
 
@@ -80,10 +87,12 @@ class Joint(Bearing, Record, ABC):
         places = [place for place in self.places if component == 2 or moves_with_node(place)]
         return [(node(place), component) for place in places]
 
-    def _hold(self, motion: str, axis: Point, corner: Point | None = None) -> Connector:
+    def _hold(
+        self, motion: str, axis: Any, corner: Point | None = None, other: Any = ()
+    ) -> Connector:
         """Return a connector that holds a relative motion of the first two places."""
         a, b = self.places[:2]
-        return Component(type(self).__name__, motion, a, b, RIGID, axis, corner)
+        return Component(type(self).__name__, motion, a, b, RIGID, axis, corner, other=other)
 
 
 class _AtPoint(Joint):
@@ -102,6 +111,10 @@ class _AtPoint(Joint):
         vars(self).update(places=places, multipliers=multipliers)
         self.__post_init__()
 
+    def directions(self) -> list[tuple[Any, ...]]:
+        """Return motions that hold directions, besides shared rotations."""
+        return []
+
     def __post_init__(self) -> None:
         super().__post_init__()
         kind = type(self).__name__
@@ -112,15 +125,17 @@ class _AtPoint(Joint):
         shared = () if self.multipliers else self.joined
         moving = [place for place in self.places if self.multipliers or not moves_with_node(place)]
         base = next((place for place in self.places if place not in moving), self.places[0])
-        motions = [("parting", (1.0, 0.0)), ("parting", (0.0, 1.0))]
+        axes = axes_of(self.places[0].point)
+        motions: list[tuple[Any, ...]] = [("parting", axis) for axis in axes]
         if self.multipliers and 2 in self.joined:
-            motions.append(("turning", (1.0, 0.0)))
+            pairs = zip(axes, [*axes[1:], axes[0]], strict=True)
+            in_space: list[tuple[Any, ...]] = [("aligning", axis, other) for axis, other in pairs]
+            motions += in_space if len(axes) == 3 else [("turning", axes[0])]
+        held = ((x, [*motions * (x in moving), *self.directions()]) for x in self.places)
         holders = tuple(
-            Component(kind, motion, base, place, RIGID, axis)
-            for place in moving
-            if place != base
-            for motion, axis in motions
-        )
+            Component(kind, motion, base, place, RIGID, axis, other=tuple(*other))
+            for place, some in held if place != base for motion, axis, *other in some
+        )  # fmt: skip
         vars(self).update(shared=shared, holders=holders)
 
 
@@ -149,8 +164,12 @@ class Rigid(_AtPoint):
 class Revolute(_AtPoint):
     """Revolute joint: all ``places`` share the displacement, and each turns freely.
 
-    The arguments are the same as for :class:`Rigid`.  Friction by the force of the joint needs
+    The arguments are the same as for :class:`Rigid`, and in space the ``axis`` about which the
+    places turn, a direction in the undeformed scene.  Friction by the force of the joint needs
     ``multipliers=True``, see :class:`Coulomb`.
+
+    Raises:
+        ModelError: In space, without an axis; a ball joint is :class:`Spherical`.
 
     Example:
         >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")
@@ -161,6 +180,55 @@ class Revolute(_AtPoint):
 
     places: tuple[AttachmentPoint, ...]
     multipliers: Switch
+    axis: Any
+
+    def __init__(
+        self, *places: AttachmentPoint, multipliers: bool = False,
+        axis: Sequence[float] | None = None,
+    ) -> None:  # fmt: skip
+        vars(self).update(places=places, multipliers=multipliers, axis=axis)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        in_space = any(len(getattr(x, "point", ())) == 3 for x in self.places)
+        if in_space != (self.axis is not None):
+            raise ModelError(
+                f"{self}: in space give axis=(x, y, z), about which the places turn, or use "
+                "Spherical; in the plane there is no axis"
+            )
+        if self.axis is not None:
+            a, b = self.places[:2]
+            vars(self).update(axis=unit_axis(a, b, self.axis, "Revolute"))
+        super().__post_init__()
+
+    def directions(self) -> list[tuple[Any, ...]]:
+        """See the base class: the axis stays normal to two directions of the first place."""
+        normals = across(self.axis) if self.axis is not None else ()
+        return [("aligning", normal, self.axis) for normal in normals]
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Spherical(_AtPoint):
+    """Ball joint in space: all ``places`` share the displacement, and each rotates freely.
+
+    The arguments are the same as for :class:`Rigid`.
+
+    Example:
+        >>> tube = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
+        >>> arm = ub.Beam((0, 0, 0), (1, 0, 0), tube, name="arm")
+        >>> hung = ub.Scene(
+        ...     [arm], joints=[ub.Spherical(ub.ground(0, 0, 0), arm.start)],
+        ...     loads=[ub.Gravity((0, 0, -9.81))],
+        ... )  # fmt: skip
+    """
+
+    places: tuple[AttachmentPoint, ...]
+    multipliers: Switch
+
+    def __post_init__(self) -> None:
+        if any(len(getattr(x, "point", ())) == 2 for x in self.places):
+            raise ModelError(f"{self}: ball joints are in space; use Revolute in the plane")
+        super().__post_init__()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +239,8 @@ class Prismatic(Joint):
         rail: Place with which the axis turns; it may be on the ground.
         slider: Place that slides.
         axis: Direction in the undeformed scene; from rail to slider by default.
-        turning: True if the slider may turn on the rail, like a pin in a slot.
+        turning: True if the slider may turn on the rail, like a pin in a slot; in space about the
+            axis, as in a cylindrical joint.
 
     Raises:
         ModelError: An axis of zero length.
@@ -191,9 +260,13 @@ class Prismatic(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        x, y = unit_axis(self.rail, self.slider, self.axis, "Prismatic")
-        vars(self).update(axis=(x, y), shared=() if self.turning else (2,))
-        vars(self).update(holders=(self._hold("sliding", (-y, x)),))
+        axis = unit_axis(self.rail, self.slider, self.axis, "Prismatic")
+        vars(self).update(axis=axis, shared=() if self.turning else (2,))
+        normals: Any = across(axis) if len(axis) == 3 else ((-axis[1], axis[0]),)
+        holders = [self._hold("sliding", normal) for normal in normals]
+        if self.turning and len(axis) == 3:  # the slider turns about the axis only
+            holders += [self._hold("aligning", normal, other=axis) for normal in normals]
+        vars(self).update(holders=tuple(holders))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -220,8 +293,8 @@ class RigidLink(Joint):
         corner = self.b.point
         if self.a.point == corner:
             raise ModelError(f"{self}: zero length; join the places with Rigid")
-        axes = (1.0, 0.0), (0.0, 1.0)
-        vars(self).update(holders=tuple(self._hold("parting", axis, corner) for axis in axes))
+        holders = tuple(self._hold("parting", axis, corner) for axis in axes_of(corner))
+        vars(self).update(holders=holders)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -247,7 +320,7 @@ class Link(Joint):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        rod = self._hold("stretching", (1.0, 0.0))
+        rod = self._hold("stretching", (1.0, 0.0, 0.0)[: len(self.a.point)])
         require_apart(rod)
         vars(self).update(holders=(rod,))
 

@@ -8,7 +8,7 @@ from abc import ABC
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -35,7 +35,17 @@ from ufl_beam.model.bodies import (
 from ufl_beam.model.connector_laws import PrescribedForce
 from ufl_beam.model.connectors import Component, Connector
 from ufl_beam.model.functions import Table, Timed, TimeFunction, steady, value_at
-from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record, Switch, Vector
+from ufl_beam.model.records import (
+    Instance,
+    NotNegative,
+    Number,
+    Positive,
+    Record,
+    Switch,
+    Vector,
+    VectorOfScene,
+    require_moment,
+)
 
 
 class Load(Record, ABC):
@@ -54,8 +64,8 @@ class LoadAtPlace(Load):
     """Base of the loads that act at one place."""
 
     place: PlaceField
-    force: Vector = (0.0, 0.0)
-    moment: Number = 0.0
+    force: VectorOfScene = (0.0, 0.0)
+    moment: Annotated[Any, require_moment] = 0.0
     amplitude: Timed = steady
 
     def __str__(self) -> str:
@@ -73,8 +83,9 @@ class PointLoad(LoadAtPlace):
 
     Args:
         place: Loaded place.
-        force: (F_x, F_y); N.
-        moment: Moment, positive counter-clockwise; N m.
+        force: (F_x, F_y), in space (F_x, F_y, F_z); N.
+        moment: Moment, positive counter-clockwise; in space a vector, whose direction is constant,
+            so that it is not conservative; N m.
         amplitude: Factor on force and moment, a function of time t (s).
 
     Example:
@@ -211,7 +222,7 @@ class LineLoad(LoadAlongBeam):
 
     Args:
         beam: Loaded beam.
-        force: (f_x, f_y); N/m.
+        force: (f_x, f_y), in space (f_x, f_y, f_z); N/m.
         moment: Moment, positive counter-clockwise; N m/m.
         amplitude: Factor on force and moment, a function of time t (s).
         span: Parameters of the beam at both ends of the load, from 0 (start of the beam) to 1
@@ -238,7 +249,7 @@ class LineLoad(LoadAlongBeam):
         [1000. 1667.]
     """
 
-    force: Vector = (0.0, 0.0)
+    force: VectorOfScene = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady
 
@@ -389,7 +400,7 @@ class Gravity(Load):
         3080.0
     """
 
-    acceleration: Vector = (0.0, -9.81)
+    acceleration: VectorOfScene = (0.0, -9.81)
     amplitude: Timed = steady
 
     def __str__(self) -> str:

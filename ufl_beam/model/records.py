@@ -21,6 +21,8 @@ from typing import (
 )
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
@@ -28,6 +30,7 @@ from ufl_beam.errors import (
     ModelError,
     require_kind,
     require_number,
+    require_point,
     require_switch,
     require_text,
     require_vector,
@@ -42,10 +45,19 @@ FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)
 """Type of a field with a number that is not negative, or infinity."""
 
 Vector = Annotated[tuple[float, float], require_vector]
+VectorOfScene = Annotated[Any, require_point]
+"""Type of a field with two numbers, or three in space."""
+
 Text = Annotated[str, require_text]
 Switch = Annotated[bool, require_switch]
 Instance = Annotated[T, require_kind]
 """Type of a field with an object of the annotated class, or of one of several classes."""
+
+
+def require_moment(value: Any, what: str) -> float | tuple[float, ...]:
+    """Return a moment or angular velocity: a number, or three numbers in space."""
+    return require_number(value, what) if np.ndim(value) == 0 else require_point(value, what)
+
 
 NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")
 """Fields used in the name of a record; errors in these fields name only the class."""

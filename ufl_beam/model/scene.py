@@ -31,14 +31,31 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_all
 from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic
-from ufl_beam.model.connectors import Component, Connector, plastic_hinges
+from ufl_beam.model.connectors import (
+    Component,
+    Connector,
+    Slide,
+    Stretch,
+    Turn,
+    plastic_hinges,
+)
 from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.joints import Joint
+from ufl_beam.model.joints import (
+    Joint,
+    Link,
+    Prismatic,
+    Revolute,
+    Rigid,
+    RigidLink,
+    Spherical,
+)
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
+    Gravity,
+    LineLoad,
     Load,
     LoadAtPlace,
     MovingLoad,
@@ -46,7 +63,7 @@ from ufl_beam.model.loads import (
     RotatingFrame,
 )
 from ufl_beam.model.records import Record
-from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.model.supports import COMPONENTS, Clamped, Pinned, Support
 from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
 
 
@@ -101,6 +118,7 @@ class Scene(Record, Rich):
         super().__post_init__()
         if not self.beams and not self.bodies:
             raise ModelError("Scene: no beams and no bodies")
+        self._require_one_dimension()
         if GROUND in self.bodies:
             raise ModelError("Scene: the ground is in every scene; leave it out of bodies")
         for work in self.works if not self.beams else ():
@@ -162,6 +180,39 @@ class Scene(Record, Rich):
         return f"<Scene: {self}>"
 
     @property
+    def in_space(self) -> bool:
+        """True if points of the scene have three coordinates."""
+        points = (*(b.ends[0] for b in self.beams), *(b.center for b in self.bodies))
+        return any(len(point) == 3 for point in points)
+
+    def _require_one_dimension(self) -> None:
+        """Raise unless all vectors have two components, or three in a scene of known kinds."""
+        d, of = (3, "in space") if self.in_space else (2, "in the plane")
+        for beam in (b for b in self.beams if len(b.ends[0]) != d):
+            raise ModelError(
+                f"{beam.name}: its ends have two coordinates, but other beams are in space; give "
+                "all points three coordinates"
+            )
+        names = "force", "acceleration", "linear", "about", "moment", "angular"
+        records: list[Record] = [*self.loads, *self.initial]
+        for record in records:
+            for name in names:
+                vector = getattr(record, name, None)
+                wanted = 1 if d == 2 and name in ("moment", "angular") else d
+                if vector is not None and np.any(vector) and np.size(vector) != wanted:
+                    raise ModelError(
+                        f"{record._label()}: {name} = {vector} must have {wanted} components, "
+                        f"because the scene is {of}"
+                    )
+        if d == 3:
+            require_space(self)
+
+    def require_plane(self, what: str) -> None:
+        """Raise :class:`ModelError` if points of the scene have three coordinates."""
+        if self.in_space:
+            raise ModelError(f"{what}: only for scenes in the plane, so far; this one is in space")
+
+    @property
     def parts(self) -> list[Beam | Body]:
         """The beams, then the bodies."""
         return [*self.beams, *self.bodies]
@@ -176,11 +227,13 @@ class Scene(Record, Rich):
         beams = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
         vertices = {kind: np.array(b.vertices(())) for kind, b in beams.items()}
         curves = [beam.curve for beam in self.beams]
-        on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
+        d = 3 if self.in_space else 2
+        on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams], d)
         others = [body.center for body in self.bodies]
         others += [place.point for _, place in self.attachments() if isinstance(place, BodyPoint)]
-        points = np.concatenate([on_beams, np.reshape(others, (-1, 2))])
-        gyration = [math.sqrt(b.inertia / b.mass) for b in self.bodies if b.mass > 0]
+        points = np.concatenate([on_beams, np.reshape(others, (-1, d))])
+        heavy = (b for b in self.bodies if b.mass > 0)
+        gyration = [math.sqrt(np.linalg.eigvalsh(b.tensor).max() / b.mass) for b in heavy]
         return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
 
     @cached_property
@@ -341,6 +394,37 @@ class Scene(Record, Rich):
                         f"{COMPONENTS[component]}; remove one"
                     )
                 holders[dof] = str(support)
+
+
+IN_SPACE = (
+    Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
+    Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity,
+)  # fmt: skip
+"""Classes of the objects of scenes in space."""
+
+
+def require_space(scene: Scene) -> None:
+    """Raise :class:`ModelError` unless all objects of a scene have a counterpart in space."""
+    records: list[Any] = [*scene.joints, *scene.supports, *scene.loads, *scene.masses]
+    records += [*scene.initial, *scene.damping, *scene.bodies, *scene.connectors, *scene.works]
+    for record in records:
+        if not isinstance(record, IN_SPACE):
+            raise ModelError(
+                f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in "
+                f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
+            )
+    for beam in scene.beams:
+        section = beam.section
+        if missing := [x for x in ("GA3", "EI2", "GJ") if getattr(section, x) is None]:
+            raise ModelError(
+                f"{beam.name}: its section has no {', '.join(missing)}, stiffnesses of beams in "
+                "space; give Section(GA3=, EI2=, GJ=), or Section.rectangle, circle or tube"
+            )
+        if beam.hinges or section.section_points(section.hinge):
+            raise ModelError(
+                f"{beam.name}: inelastic laws and hinges are for scenes in the plane; beams in "
+                "space are elastic"
+            )
 
 
 def not_in(scene: Scene, member: Member | Body) -> str:

@@ -36,6 +36,13 @@ from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 ResultantLaw = Annotated[MaterialLaw | None, require_law]
 
+
+def require_stiffness(value: float | None, what: str) -> None:
+    """Raise :class:`ModelError` unless ``value`` is a positive number or None."""
+    if value is not None:
+        require_number(value, what, positive=True)
+
+
 LAWS = {"axial", "shear", "bending", "hinge", "interaction"}
 """Arguments of a section that are laws."""
 
@@ -51,6 +58,10 @@ class Section(Record):
         rhoA: Mass per length; kg/m.  The default means a beam without mass, of which dynamics
             may warn; there is no warning of an explicit zero.
         rhoI: Rotary inertia per length; kg m.
+        GA3, EI2, GJ, rhoI2: In space, stiffness against shear along axis 3, bending about axis 2,
+            and torsion, and rotary inertia about axis 2; N, N m², N m², kg m.  ``GA`` is for shear
+            along axis 2, ``EI`` and ``rhoI`` are about axis 3.  Warping, and shear centres away
+            from the centroid, are not modelled.
         depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
             rectangle with the same EI/EA.  A beam shorter than depth/√12 causes a warning.
         axial: Inelastic law of the axial force N; N.
@@ -91,6 +102,10 @@ class Section(Record):
     fibres: Instance[PlacedFibres | None] = None
     interaction: Annotated[MaterialLaw | None, partial(require_law, interaction=True)] = None
     shape: Instance[Shape | None] = None
+    GA3: Annotated[float | None, require_stiffness] = None
+    EI2: Annotated[float | None, require_stiffness] = None
+    GJ: Annotated[float | None, require_stiffness] = None
+    rhoI2: Annotated[float | None, require_stiffness] = None
     massless_by_default: bool = field(init=False, repr=False)
 
     steel = Moved("ufl_beam.structures.steel")

@@ -81,6 +81,7 @@ class DolfinxView:
     """
 
     def __init__(self, view: Any) -> None:  # a `StateView`, which this module must not import
+        view.scene.require_plane("dolfinx")
         self._view = view
         self._fields = DolfinxFields(view.subdomain)
         self._functions: dict[str, fem.Function] = {}

@@ -234,6 +234,7 @@ class Extremes(Restartable):
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin with the initial state, or continue from a :meth:`state`."""
+        simulation.scene.require_plane("Extremes")
         self._numbering: DofNumbering = simulation.numbering
         self._solution = simulation.solution
         if self._accelerated and not has_inertia(simulation.scheme):

@@ -44,6 +44,7 @@ class TimeSeries(FileRecorder):
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write mesh and initial state, or delete the steps that follow a :meth:`state`."""
+        simulation.scene.require_plane(type(self).__name__)
         self._scene = LineData(simulation)
         if (points := len(self._scene.points)) > self.limit:
             raise ArgumentError(

@@ -19,6 +19,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
+from ufl_beam.discretization.cells_in_space import TURNS
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import in_one_line
@@ -124,14 +125,16 @@ class Columns:
         column "record"; if None, the row has forces of cells.
         """
         size, scene = numbering.size, numbering.scene
+        nodes = len(numbering.points) + len(scene.rigid_bodies)
         return cls({
             "t": (),  # time, s; or the load factor of a path
-            "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
+            "reactions": (len(scene.supports), numbering.width),  # of supports, in their axes
             "connectors": (len(scene.all_connectors), len(Connection._fields)),
             # `Points.recorded`, Gauss point after Gauss point of cells that can yield or break
             "material": (
                 len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT),
             ),
+            **({TURNS: (nodes, 4)} if scene.in_space else {}),
             **dict.fromkeys(ledger, ()),  # J
             "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
@@ -211,6 +214,7 @@ class StateWriter:
     def __init__(
         self, time_loop: Any, subdomain: Subdomain, ledger: Ledger, supports: Supports,
         inelastic: Sequence[Any], connector_terms: Sequence[Any], cell_forces: CellForces,
+        in_space: Sequence[Any] = (),
     ) -> None:  # fmt: skip
         self._time_loop, self._subdomain = time_loop, subdomain
         self._alive, self._groups = list[Any](), list[Any]()
@@ -251,9 +255,10 @@ class StateWriter:
                 self._copy(self._place(account.amounts), first, len(account))
         # Degrees of freedom of supports that this process owns, and their indices in the row
         constrained = [
-            (dof, at["reactions"].start + 3 * k + c)
+            (numbering.node(support.place)[c], at["reactions"].start + numbering.width * k + c)
             for k, support in enumerate(numbering.scene.supports)
-            for c, dof in ((c, subdomain.numbering.node(support.place)[c]) for c in support.held)
+            for held in support.held
+            for c in numbering.components(held)
         ]
         dofs, to = np.array(constrained, dtype=np.int64).reshape(-1, 2).T
         owned = subdomain.owns(dofs)
@@ -267,6 +272,10 @@ class StateWriter:
             rows = at["material"].start + width * sections.ravel()
             first = width * np.arange(len(rows))
             self._add(self._place(term.points.recorded), first[:, None] + k, rows[:, None] + k)
+        for term in in_space:
+            mine, nodes = term.turns(numbering)
+            rows = at[TURNS].start + 4 * nodes[:, None] + np.arange(4)
+            self._add(self._place(term.states), mine, rows)
         for connector in connector_terms:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices
             self._add(now, connector.forces_at, rows + FORCE)

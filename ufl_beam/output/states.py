@@ -14,6 +14,13 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.cell_functions import mass_matrix, strains_of
+from ufl_beam.discretization.cells_in_space import (
+    STIFFNESS_IN_SPACE,
+    TURNS,
+    momentum_in_space,
+    strains_in_space,
+    turns_at,
+)
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -280,6 +287,9 @@ class States:
     def displacement(self, place: AttachmentPoint) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
+        In space, return the displacement (u, v, w) and the rotation vector, of an angle up to π;
+        (n+1, 6).
+
         Between the nodes of a beam, values are interpolated with the degree of the cells.  In
         bodies, values are exact.
 
@@ -287,7 +297,11 @@ class States:
             ArgumentError: The beam or body of the place is not in the scene.
         """
         motion = values_at(self.numbering, place, self.column("q"))
-        if isinstance(place, BodyPoint):
+        if self.scene.in_space:
+            turns = turns_at(self.numbering, place, self.column(TURNS))
+            motion[:, :3] += turns.apply(arm(place)) - arm(place)
+            motion[:, 3:] = turns.as_rotvec()
+        elif isinstance(place, BodyPoint):
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
 
@@ -302,16 +316,18 @@ class States:
         return velocity_at(self.numbering, place, self.column("q"), v)
 
     def position(self, place: AttachmentPoint) -> Array:
-        """Return the coordinates of a place in the deformed scene; (n+1, 2); m."""
+        """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""
         if isinstance(place, BodyPoint):
-            return np.asarray(place.point + self.displacement(place)[:, :2])
+            u = self.displacement(place)[:, : self.numbering.displacements]
+            return np.asarray(place.point + u)
         nodes, weights = self.numbering.weights(place)
-        return np.asarray(weights @ self.numbering.points[nodes] + self.displacement(place)[:, :2])
+        u = self.displacement(place)[:, : self.numbering.displacements]
+        return np.asarray(weights @ self.numbering.points[nodes] + u)
 
     def shape(self, beam: Member, n: int = -1) -> Array:
-        """Return the deformed vertices of a beam at the n-th time; (num_vertices, 2); m."""
+        """Return the deformed vertices of a beam at the n-th time; (num_vertices, 2 or 3); m."""
         vertices, numbering = self.numbering.vertices_of(beam), self.numbering
-        moved = self._row("q", n)[numbering.dofs[vertices, :2]]
+        moved = self._row("q", n)[numbering.dofs[vertices, : numbering.displacements]]
         return np.asarray(numbering.points[vertices] + moved)
 
     # -- joints --------------------------------------------------------------------------------
@@ -432,6 +448,7 @@ class States:
         Returns:
             Section forces; (num_cells, len(pieces), 3); N, N, N m.
         """
+        self.scene.require_plane("section forces within cells")
         key = self.index(n), pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
             along, q = self.cells.along, self._in_equilibrium(n)
@@ -441,7 +458,15 @@ class States:
         return self._computed[1]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
-        """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m."""
+        """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m.
+
+        In space, return the forces along, and moments about, the axes 1, 2 and 3 of the sections,
+        of the strains of the state; (num_cells, 6).
+        """
+        if self.scene.in_space:
+            stiffness = self.cells.fields.section_values(*STIFFNESS_IN_SPACE)
+            forces = stiffness * self.mean_strains(n)
+            return np.asarray(forces[self.numbering.cells_of(beam)])
         return np.asarray(self.cell_forces(n)[self.numbering.cells_of(beam), 0])
 
     def section_forces_at(self, place: Place) -> Array:
@@ -462,6 +487,7 @@ class States:
 
         With ``in_plane`` forces along x and y are returned instead of N and V.
         """
+        self.scene.require_plane("section forces at places")
         n, chosen = range(len(self)), np.array(cells, dtype=np.int64)
         dofs, forces = self.cells.along.dofs[chosen], np.zeros((len(n), len(chosen), 3))
         q = np.array([self._in_equilibrium(k)[dofs] for k in n])
@@ -498,6 +524,7 @@ class States:
     def strains(self, beam: Member, n: int = -1) -> Array:
         """Return (Σ, Γ, K) in the cells of a beam at the n-th time; (num_cells, 3); 1, 1, 1/m.
 
+        In space, they are strains along, and curvatures about, the axes of the section; (..., 6).
         K includes the jump of a hinge, divided by the length of its cell.
         """
         return self.mean_strains(n)[self.numbering.cells_of(beam)]
@@ -509,6 +536,8 @@ class States:
 
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
+        if self.scene.in_space:
+            return strains_in_space(self.cells.fields, self._row("q", n), self._row(TURNS, n))
         strains = np.empty((len(self.numbering.cells), 3))
         in_points = self.cells.strains(self._row("q", n)).reshape(len(strains), -1, 3)
         weights = self.numbering.mesh.point_weights
@@ -607,6 +636,8 @@ class States:
     def momentum(self) -> Array:
         """Return momenta (p_x, p_y, L), with L about the origin; (n+1, 3); N s, N s, N m s.
 
+        In space both are vectors; (n+1, 6).
+
         They contain beams, bodies and point masses, but not masses of moving loads.
 
         Raises:
@@ -615,6 +646,9 @@ class States:
         if not len(self.column("v")):
             raise ArgumentError("momentum: the run was static; there is none")
         times, numbering = Product(mass_matrix(self.cells.fields)), self.numbering
+        if self.scene.in_space:
+            rows = [[self._row(x, n) for x in ("q", "v", TURNS)] for n in range(len(self))]
+            return np.array([momentum_in_space(numbering, q, times(v), z) for q, v, z in rows])
         dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])
         centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
         _, first = np.unique(dofs[:, 0], return_index=True)

@@ -124,6 +124,9 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             f"plot: quantity = {quantity!r} of a {type(shown).__name__} is not one of "
             f"{', '.join(pictures)}{hint}"
         )
+    scene = shown if isinstance(shown, Scene) else getattr(shown, "scene", None)
+    if isinstance(scene, Scene):
+        scene.require_plane("plot")
     quantity = quantity or next(iter(pictures))
     draw = pictures[quantity]
     try:

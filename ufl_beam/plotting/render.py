@@ -302,6 +302,7 @@ class Solids:
     size: tuple[int, int]
 
     def __post_init__(self) -> None:
+        self.solution.scene.require_plane("render and animate")
         style.require_option(self.quantity, QUANTITIES, "quantity")
         require_number(self.thickness, "thickness", positive=True)
         require_kind(self.camera, Camera, "camera")

@@ -29,6 +29,7 @@ from ufl_beam.discretization.state_transfer import (
     geometry,
     same_unknowns,
 )
+from ufl_beam.display import at_point
 from ufl_beam.errors import ArgumentError, ModelError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia, stages_of
 from ufl_beam.model.beams import DEFAULT_MESH, Mesh
@@ -66,7 +67,9 @@ def checked_numbering(
     free_motion = ""
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
-    if has_inertia(scheme):
+    if scene.in_space:
+        pass
+    elif has_inertia(scheme):
         require_inertia(scene)
         warn_of_masses(scene)
         if scene.initial:
@@ -80,6 +83,9 @@ def checked_numbering(
         if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
+    if scene.in_space:
+        require_for_space(scheme)
+        return DofNumbering(scene, mesh), ""
     require_works(scene, mesh.degree, scheme)
     require_independent(scene)
     warn_of_far_points(scene)
@@ -88,6 +94,16 @@ def checked_numbering(
     warn_of_touching(numbering)
     warn_of_held_motions(scene)
     return numbering, free_motion
+
+
+def require_for_space(scheme: Scheme) -> None:
+    """Raise :class:`ModelError` for a scheme whose rotations are for the plane."""
+    moving = scheme.half_tangents and not scheme.lost_fraction if has_inertia(scheme) else True
+    if not moving or len(stages_of(scheme)) > 1:
+        raise ModelError(
+            f"{scheme!r}: rotations in space need EnergyMomentum(), Static() or "
+            "EnergyMomentumStatic(); angles of other schemes cannot be added in space"
+        )
 
 
 def require_rates(scene: Scene, scheme: DynamicScheme) -> None:
@@ -262,16 +278,17 @@ def _initial_velocity(numbering: DofNumbering) -> Array:
     parts: list[Any] = [b for b in scene.beams if b.section.rhoA or b.section.rhoI]
     parts += [b for b in scene.bodies if b.mass or b.inertia]
     given: list[tuple[Any, Any]] = [(part, x.at) for x in scene.initial for part in x.beams]
-    rest = [(part, lambda *_: np.zeros(3)) for part in parts if part not in dict(given)]
+    still = np.zeros(numbering.width)
+    rest = [(part, lambda *_: still) for part in parts if part not in dict(given)]
     for part, at in given + rest * bool(given):
         points, dofs = numbering.nodes_of(part)
-        new = np.array([at(x, y) for x, y in points])
+        new = np.array([at(*point) for point in points])
         fastest = max(fastest, np.abs(new * scales[dofs]).max())
         apart = (np.abs(v[dofs] - new) * scales[dofs] > 1e-9 * fastest).any(axis=1)
         if apart.any():
-            (x, y), rate = points[apart][0], np.nanmax(np.abs(v[dofs[apart][0]]))
+            place, rate = at_point(points[apart][0]), np.nanmax(np.abs(v[dofs[apart][0]]))
             raise ArgumentError(
-                f"Velocity: {part.name} gets two different velocities at ({x:g}, {y:g}), from "
+                f"Velocity: {part.name} gets two different velocities at {place}, from "
                 "itself, zero by default, or from a part that it is joined to and that moves at "
                 f"{rate:.3g} m/s or rad/s; give all joined parts velocities that agree"
             )
@@ -293,7 +310,7 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
     for connector, dofs in zip(
         numbering.scene.all_connectors, numbering.dofs_of_connectors, strict=True
     ):
-        a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
+        a, b = v[dofs[:-1]].reshape(-1, 2).T
         by_a, by_b = connector.rigidly()
         rate = float(np.dot(by_a, a) + np.dot(by_b, b))
         if connector.law is RIGID and abs(rate) > 1e-9 * fastest / (
@@ -304,9 +321,9 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
                 "or rad/s; give all joined parts velocities that agree"
             )
     supports = {
-        int(numbering.node(support.place)[c]): (support, c)
+        int(numbering.node(support.place)[k]): (support, c)
         for support in numbering.scene.supports if not support.moving and not support.angle
-        for c in support.held
+        for c in support.held for k in numbering.components(c)
     }  # fmt: skip
     moving = speeds > 1e-9 * speeds.max()
     for beam in (beam for velocity in numbering.scene.initial for beam in velocity.beams):

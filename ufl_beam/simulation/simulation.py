@@ -122,7 +122,8 @@ class Simulation(Stepper):
         start = chosen_state(start, "start")
         fresh = start is None
         numbering, free_motion = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
-        subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
+        shared = 0 if scene.in_space else len(numbering.cells)
+        subdomain = Subdomain(numbering, sharing(comm, shared))
         together, state = Agreement(subdomain.comm), initial_state(numbering, start)
         q, v, internal, _ = state
         t0, same = continuation(start, scene, t0)
@@ -411,7 +412,7 @@ class Simulation(Stepper):
     def _writer(self) -> StateWriter:
         return StateWriter(
             self.time_loop, self.subdomain, self.ledger, self.supports, self.inelastic,
-            self.connector_terms, self.cell_forces,
+            self.connector_terms, self.cell_forces, self.equation.nodes_in_space,
         )  # fmt: skip
 
     @property

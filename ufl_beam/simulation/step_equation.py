@@ -18,9 +18,9 @@ from ufl_beam.blocks.beams import BeamCells, InelasticCells, elastic_cells
 from ufl_beam.blocks.block import Block, BlockSetting
 from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
-from ufl_beam.blocks.effect_blocks import EffectBlock
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
+from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space, dead_moments
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -121,7 +121,13 @@ class StepEquation:
         if scene.beams:
             ledger.state["stored"] += 0.0
         subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
-        if elastic.any():
+        self.in_space, self.nodes_in_space = list[CellsInSpace](), list[Any]()
+        if scene.in_space:
+            self.in_space = [CellsInSpace(fields, in_blocks)] if len(fields.order) else []
+            self.loads += dead_moments(in_blocks)
+            self.nodes_in_space += [*self.in_space, *bodies_in_space(in_blocks)]
+            others += self.nodes_in_space[len(self.in_space) :]
+        elif elastic.any():
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
@@ -140,8 +146,9 @@ class StepEquation:
                     others += tangent_damping(damping, subset, self.inelastic, in_blocks)
             else:
                 others.append(viscosity(damping, fields, in_blocks))
-        self.inner: list[Term] = [*self.beams, *self.connector_terms]
+        self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
+        self._predicting: list[Any] = [*self.beams, *self.in_space]
         self.terms: list[Term] = [*self.inner, *self.others]
         self.imposed = [x for x in self.beams if x.imposed]
         self._fill_c(search, switched)
@@ -168,7 +175,7 @@ class StepEquation:
         product, cells = pop("add_step_tangent"), pop("add_cells")
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
-        predicted = [x for x in (term.prediction for term in self.beams) if x is not None]
+        predicted = [x.prediction for x in self._predicting if x.prediction is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -206,7 +213,7 @@ class StepEquation:
         archive = Archive(self.subdomain)
         prediction.save_or_restore(archive)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.connector_terms):
+        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
             term.save_or_restore(archive, q)
         friction = any(
             has_friction(connector.law)
@@ -219,7 +226,7 @@ class StepEquation:
             self._pass_on_step(archive, q)
         for load in self.loads:
             load.pass_on(archive)
-            if isinstance(load, EffectBlock):
+            if isinstance(load, Block) and load.remembers:
                 load.keep_states(archive)
         return archive.state()
 
@@ -238,11 +245,11 @@ class StepEquation:
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.connector_terms):
-            term.save_or_restore(archive, NOWHERE)
+        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
+            term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
         unknown = archive.unknown.copy()
         for load in self.loads:
-            if isinstance(load, EffectBlock):
+            if isinstance(load, Block) and load.remembers:
                 load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
@@ -287,8 +294,8 @@ class StepEquation:
                     begin(data, c, ffi.NULL, ffi.NULL)
             for beams in imposed:
                 beams.impose(c)
-        for beams in self.beams:
-            if beams in some and (predicted := beams.prediction) is not None:
+        for cells in self._predicting:
+            if cells in some and (predicted := cells.prediction) is not None:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:

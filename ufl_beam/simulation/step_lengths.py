@@ -159,6 +159,7 @@ class AdaptiveSteps(Steps):
 
     def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
         super().__init__(simulation, t1)
+        simulation.scene.require_plane("dt = Adaptive(...)")
         t0 = simulation.t
         self._tolerance = control.tolerance
         self._longest = control.longest or t1 - t0

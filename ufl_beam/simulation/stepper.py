@@ -234,7 +234,7 @@ class Stepper(StateView):
         least = LEAST_IN_MOTION if in_motion else LEAST_AT_REST
         self.solver = solver = Solver(subdomain, equation, newton, least)
         rotations = subdomain.rotations
-        half_tangents = with_half_tangents(scheme, rotations)
+        half_tangents = with_half_tangents(scheme, subdomain.plane_rotations)
         loads = [load.vector for load in equation.loads]
         multipliers = subdomain.multipliers.astype(np.int32)
         opens = [phase.opens for phase in phases if phase.opens is not None]
@@ -268,7 +268,7 @@ class Stepper(StateView):
             fill(self.time_loop, x=np.zeros(subdomain.size))
         if path is not None:
             fill(self.time_loop, path=path.c)
-        if not (scheme.half_tangents and in_motion):
+        if not (scheme.half_tangents and in_motion) and not self.scene.in_space:
             fill(self.time_loop, parts=rigid_parts(subdomain))
         self._alive: list[Any] = [opens]
         self._watches = list[Any]()  # extremes that C updates after each step

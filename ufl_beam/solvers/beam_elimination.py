@@ -169,7 +169,10 @@ class Elimination:
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
         ghosts = np.concatenate(subdomain.comm.allgather(subdomain.dofs[subdomain.num_owned :]))
         alone = ~np.isin(subdomain.dofs, ghosts)
-        pattern = subdomain.cell_dofs, A.indptr, A.indices, alone, subdomain.dofs
+        chains = subdomain.cell_dofs
+        if subdomain.numbering.scene.in_space:
+            chains = np.zeros((0, 6), dtype=np.int32)  # blocks of the elimination are of the plane
+        pattern = chains, A.indptr, A.indices, alone, subdomain.dofs
         remaining, at, indptr, columns, *arrays = _plan(*pattern, subdomain.num_owned)
         self.dofs, self.shared = subdomain.dofs[remaining], ~alone[remaining]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)

@@ -51,7 +51,7 @@ class Supports:
             if support.angle and len(subdomain.local(dofs[:2])):
                 turned.append(_turned_axes(subdomain.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
-                local_dofs = subdomain.local(dofs[[component]])
+                local_dofs = subdomain.local(dofs[[*subdomain.numbering.components(component)]])
                 constrained.extend(local_dofs)
                 if component in support.moving:
                     self.motions.extend((dof, motion, support) for dof in local_dofs)

@@ -148,20 +148,21 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
     """
     numbering, cells = subdomain.numbering, subdomain.cells
     mesh, at_places, loaded = numbering.mesh, [], None
+    # In space, moments at places are statements, and there are none along beams
+    moment = [0.0] * 3 if numbering.scene.in_space else [getattr(load, "moment", 0.0)]
     if isinstance(load, PointLoad):
-        at_places = [(load.place, (*load.force, load.moment))]
+        at_places = [(load.place, (*load.force, *moment))]
     elif isinstance(load, LineLoad):
         loaded, factors = loaded_cells(load, subdomain)
-        shares, density = factors @ mesh.gauss[1], [*load.force, load.moment]
+        shares, density = factors @ mesh.gauss[1], [*load.force, *moment]
     elif isinstance(load, Gravity):
-        g_x, g_y = load.acceleration
+        density = [*load.acceleration, *moment]
         at_places = [
-            (at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in point_masses(numbering.scene)
+            (at, tuple(mass * g for g in density)) for at, mass, _ in point_masses(numbering.scene)
         ]
         rhoA = np.array([beam.section.rhoA for beam in numbering.scene.beams])
         loaded = np.arange(len(cells))
         shares = np.outer(rhoA[numbering.beam_of_cell[cells]], mesh.fractions)
-        density = [g_x, g_y, 0.0]
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     # Connectors of Scene.all_connectors apply the forces at other places.

@@ -147,10 +147,12 @@ class Inertia(Term):
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
-        rotations = with_half_tangents(scheme, fields.subdomain.rotations)
+        rotations = with_half_tangents(scheme, fields.subdomain.plane_rotations)
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.subdomain.scratch)
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_forces, fields), lib.DENSITY, *at)]
+        if fields.subdomain.numbering.scene.in_space:
+            self.in_cells = []
         self._ledger, self._A, self.scheme = ledger, A, scheme
         size, number = len(v), FURTHER + len(scheme.further_rates)
         self.loses_energy = checked_coefficients(scheme).velocity_defect is not None

@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: MIT
+"""Scenes in space: equality with the plane, balances, restart, and errors before a run."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ufl_beam as ub
+
+EXACT = ub.Newton(rtol=1e-13)
+STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
+OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
+TURNS = [Rotation.identity(), Rotation.from_rotvec([0.3, -0.7, 1.1])]
+
+
+def frame(section, at, direction, moment):
+    """Two beams with a rigid joint on a pin; vectors of the plane go through ``at``."""
+    long = ub.Beam(at(6, 0), at(0, 8), section, cells=10, **direction(1, 1))
+    short = ub.Beam(at(0, 8), at(3, 9), section, cells=4, **direction(0, 1))
+    push = ub.PointLoad(long.start, force=at(8, 0), moment=moment, amplitude=lambda t: t < 0.5)
+    return ub.Scene(
+        [long, short], joints=[ub.Rigid(long.end, short.start)],
+        supports=[ub.Pinned(short.end)],
+        loads=[push, ub.LineLoad(long, force=at(1, -2)), ub.Gravity(at(0.5, -1))],
+    )  # fmt: skip
+
+
+def in_plane():
+    return frame(ub.Section(**STIFF), lambda x, y: (x, y), lambda *_: {}, -80.0)
+
+
+def in_space(turn):
+    def at(x, y):
+        return tuple(turn.apply([x, y, 0.0]))
+
+    section, moment = ub.Section(**STIFF, **OTHER), tuple(turn.apply([0.0, 0.0, -80.0]))
+    return frame(section, at, lambda x, y: {"up": at(x, y)}, moment)
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], ids=str)
+def test_a_planar_scene_in_space_has_the_same_motion(scheme, turn):
+    """To round-off, also in a turned plane, and nothing moves out of the plane."""
+    runs = [
+        ub.simulate(x, scheme, t=(0, 1), dt=0.1, newton=EXACT, progress=False)
+        for x in (in_plane(), in_space(turn))
+    ]
+    plane, space = [run.displacement(run.scene.beams[0].start) for run in runs]
+    back = turn.inv()
+    u, rotation = back.apply(space[:, :3]), back.apply(space[:, 3:])
+    size = runs[0].scene.size
+    assert np.abs(u[:, :2] - plane[:, :2]).max() < 1e-13 * size
+    assert np.abs(u[:, 2]).max() < 1e-13 * size
+    wrapped = Rotation.from_rotvec(plane[:, 2:] * [[0.0, 0.0, 1.0]]).as_rotvec()
+    assert np.abs(rotation - wrapped).max() < 1e-12
+    for name in ("stored", "kinetic"):
+        pair = [run.energy[name] for run in runs]
+        assert np.allclose(*pair, rtol=1e-12, atol=1e-12 * runs[0].energy["kinetic"].max())
+    reactions = [run.reaction(run.scene.supports[0])[1:] for run in runs]
+    forces = back.apply(reactions[1][:, :3])[:, :2]
+    assert np.abs(forces - reactions[0][:, :2]).max() < 1e-12 * np.abs(forces).max() * size
+
+
+def flight(**more):
+    """A free beam that turns and bends in space, pushed until t = 5 s."""
+    section = ub.Section(EA=1e4, GA=1e4, EI=500.0, rhoA=1.0, rhoI=10.0, GA3=1e4, EI2=500.0,
+                         GJ=500.0, rhoI2=10.0)  # fmt: skip
+    beam = ub.Beam((6, 0, 0), (0, 8, 0), section, cells=10)
+    pulse = ub.Table([0, 2.5, 5], [0, 200, 0])
+    push = ub.PointLoad(beam.start, force=(0.1, 0, 0), moment=(0, -0.5, -1), amplitude=pulse)
+    return ub.Scene([beam], loads=[push], **more)
+
+
+def test_flight_in_space():
+    """Energy and positions at 5 s, computed by a separate program with quaternions and NumPy."""
+    run = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=0.02, progress=False)
+    (beam,) = run.scene.beams
+    assert np.allclose(run.energy.total[-1], 723.36647059, rtol=1e-11)
+    moved = run.displacement(beam.start)[-1, :3]
+    assert np.abs(moved - [13.25048125, 1.63440641, -2.07060071]).max() < 1e-7
+    free = ub.simulate(run.scene, ub.EnergyMomentum(), t=(5, 25), dt=0.1, start=run, progress=False)
+    total = free.energy.total
+    assert np.ptp(total) < 1e-12 * total[0]
+
+
+def test_restart_in_space_changes_no_bit():
+    whole, first = (
+        ub.simulate(in_space(TURNS[1]), ub.EnergyMomentum(), t=(0, t), dt=0.05, progress=False)
+        for t in (2, 1)
+    )
+    second = ub.simulate(
+        first.scene, ub.EnergyMomentum(), t=(1, 2), dt=0.05, start=first, progress=False
+    )
+    for one, other in zip(whole.scene.beams, first.scene.beams, strict=True):
+        assert (whole.displacement(one.at(0.3))[-1] == second.displacement(other.at(0.3))[-1]).all()
+
+
+def bend(cells):
+    """Arc of 45 degrees under a force normal to its plane (Bathe and Bolourchi 1979)."""
+    E, A, I = 1e7, 1.0, 1 / 12
+    section = ub.Section(EA=E * A, GA=E * A / 2, EI=E * I, GA3=E * A / 2, EI2=E * I, GJ=E * I)
+
+    def arc(s):
+        angle = s * np.pi / 4
+        return 100 * np.sin(angle), 100 * (1 - np.cos(angle)), 0.0
+
+    beam = ub.Beam.along(arc, section, cells=cells)
+    load = ub.PointLoad(beam.end, force=(0, 0, 600.0), amplitude=lambda t: t)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+
+
+def test_bend_in_statics():
+    """The tip converges with the square of the cells to a solution of the differential equation.
+
+    It was computed by shooting.
+    """
+    exact, errors = np.array([47.15010, 15.68469, 53.47548]), []
+    for cells in (8, 16):
+        run = ub.simulate(bend(cells), ub.Static(), t=(0, 1), dt=0.25, progress=False)
+        tip = run.position(run.scene.beams[0].end)[-1]
+        errors.append(np.linalg.norm(tip - exact))
+        foot = run.reaction(run.scene.supports[0])[-1]
+        assert np.abs(foot[:3] - [0, 0, -600.0]).max() < 1e-6
+        assert np.abs(foot[3:] - np.cross(tip, [0, 0, -600.0])).max() < 1e-5
+    assert 1.9 < np.log2(errors[0] / errors[1]) < 2.1
+    assert errors[1] < 0.05
+
+
+def test_heavy_top():
+    """A body on a ball joint against its differential equation: second order in the step."""
+    mass, arm, g, J = 2.0, 0.7, 9.81, np.array([0.5, 0.5, 0.2])
+    tilt = Rotation.from_rotvec([0.0, 0.4, 0.0])
+    centre, spin = tilt.apply([0, 0, arm]), tilt.apply([0, 0, 30.0])
+    tensor = tilt.as_matrix() @ np.diag(J) @ tilt.as_matrix().T
+    about = np.diag(J) + mass * arm**2 * np.diag([1.0, 1.0, 0.0])
+
+    def rates(q, w):
+        moment = np.cross([0, 0, arm], Rotation.from_quat(q).inv().apply([0, 0, -mass * g]))
+        change = np.linalg.solve(about, moment - np.cross(w, about @ w))
+        x, y, z, r = q
+        a, b, c = w
+        return np.array([r * a + y * c - z * b, r * b + z * a - x * c, r * c + x * b - y * a,
+                         -x * a - y * b - z * c]) / 2, change  # fmt: skip
+
+    q, w, h, n = tilt.as_quat(), np.array([0, 0, 30.0]), 0.5 / 4000, 4000
+    for _ in range(n):  # the method of Runge and Kutta of fourth order
+        k1 = rates(q, w)
+        k2 = rates(q + h / 2 * k1[0], w + h / 2 * k1[1])
+        k3 = rates(q + h / 2 * k2[0], w + h / 2 * k2[1])
+        k4 = rates(q + h * k3[0], w + h * k3[1])
+        q = q + h / 6 * (k1[0] + 2 * k2[0] + 2 * k3[0] + k4[0])
+        w = w + h / 6 * (k1[1] + 2 * k2[1] + 2 * k3[1] + k4[1])
+    exact, errors = Rotation.from_quat(q).apply([0, 0, arm]), []
+    for dt in (0.01, 0.005):
+        top = ub.Body(tuple(centre), mass=mass, inertia=tensor, name="top")
+        scene = ub.Scene(
+            bodies=[top], joints=[ub.Spherical(ub.ground(0, 0, 0), top.at(0, 0, 0))],
+            loads=[ub.Gravity((0, 0, -g))],
+            initial=[ub.Velocity([top], linear=(0, 0, 0), angular=tuple(spin), about=(0, 0, 0))],
+        )  # fmt: skip
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=dt, progress=False)
+        path = run.position(top.middle)
+        assert np.abs(np.linalg.norm(path, axis=1) - arm).max() < 1e-13
+        assert run.energy.worst < 1e-10
+        errors.append(np.linalg.norm(path[-1] - exact))
+    assert 1.9 < np.log2(errors[0] / errors[1]) < 2.1
+
+
+def test_a_revolute_joint_keeps_its_axis():
+    """Two flying beams about a skew axis: energy is constant, and the axes stay together."""
+    section, axis = ub.Section(**STIFF, **OTHER), np.array([1.0, 2.0, 3.0]) / np.sqrt(14)
+    first = ub.Beam((0, 0, 0), (4, 0, 0), section, cells=4)
+    second = ub.Beam((4, 0, 0), (4, 3, 1), section, cells=4)
+    joint = ub.Revolute(first.end, second.start, axis=tuple(axis))
+    spin = ub.Velocity([first], linear=(1, 0, 2), angular=(0.3, 1.0, -0.5))
+    still = ub.Velocity([second], linear=spin.at(4, 0, 0)[:3], about=(4, 0, 0), angular=(0, 0, 0.2))
+    scene = ub.Scene([first, second], joints=[joint], initial=[spin, still])
+    with pytest.raises(ub.ArgumentError, match="would move apart"):
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False)
+    along = np.array(spin.angular) + 0.7 * axis
+    turning = ub.Velocity(
+        [second], linear=spin.at(4, 0, 0)[:3], about=(4, 0, 0), angular=tuple(along)
+    )
+    scene = ub.Scene([first, second], joints=[joint], initial=[spin, turning])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 10), dt=0.1, progress=False)
+    total = run.energy.total
+    assert np.ptp(total) < 1e-11 * total[0]
+    axes = [
+        Rotation.from_rotvec(run.displacement(place)[:, 3:]).apply(axis) for place in joint.places
+    ]
+    assert np.abs(axes[0] - axes[1]).max() < 1e-12
+    relative = Rotation.from_rotvec(run.displacement(joint.places[0])[:, 3:]).inv()
+    relative = relative * Rotation.from_rotvec(run.displacement(joint.places[1])[:, 3:])
+    assert np.linalg.norm(relative.as_rotvec(), axis=1).max() > 1.0
+
+
+def test_momenta_are_constant_in_flight():
+    run = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 10), dt=0.1, progress=False)
+    free = run.momentum()[run.times >= 5.0]
+    for some in (slice(0, 3), slice(3, 6)):
+        size = np.linalg.norm(free[0, some])
+        assert size > 1.0
+        assert np.abs(free[:, some] - free[0, some]).max() < 1e-11 * size
+
+
+def test_section_forces_of_a_cantilever():
+    """Small loads: forces and moments of beam theory, in the axes of the section."""
+    section = ub.Section(**STIFF, **OTHER)
+    up, length = np.array([0.6, 0.0, 0.8]), 4.0  # the beam is along y
+    beam = ub.Beam((0, 0, 0), (0, length, 0), section, cells=4, up=tuple(up))
+    third = np.cross([0, 1, 0], up)
+    force, moment = 1e-4 * (3.0 * up - 2.0 * third + [0, 5.0, 0]), 1e-4 * np.array([0, 7.0, 0])
+    load = ub.PointLoad(beam.end, force=tuple(force), moment=tuple(moment))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    arm = length - (np.arange(4) + 0.5) * length / 4
+    expected = 1e-4 * np.column_stack(
+        [np.full(4, 5.0), np.full(4, 3.0), np.full(4, -2.0), np.full(4, 7.0), 2 * arm, 3 * arm]
+    )
+    assert np.abs(run.section_forces(beam) - expected).max() < 1e-4 * np.abs(expected).max()
+    bent = 1e-4 * (3.0 * length**3 / 3 / section.EI + 3.0 * length / section.GA)
+    tip = run.displacement(beam.end)[-1]
+    assert abs(tip[:3] @ up / bent - 1) < 2e-2  # four cells
+
+
+BEAM = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**STIFF, **OTHER), name="arm")
+PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
+WRONG = {
+    "mixed points": (lambda: ub.Scene([BEAM, PLANAR]), "two coordinates"),
+    "mixed ends": (lambda: ub.Beam((0, 0), (1, 0, 0), BEAM.section), "must both have"),
+    "up along the beam": (
+        lambda: ub.Beam((0, 0, 0), (0, 0, 2), BEAM.section), "up = (0.0, 0.0, 1.0) is along",
+    ),
+    "up in the plane": (lambda: ub.Beam((0, 0), (1, 0), BEAM.section, up=(0, 1)), "in space"),
+    "no torsion": (
+        lambda: ub.Scene([ub.Beam((0, 0, 0), (1, 0, 0), PLANAR.section)]), "no GA3, EI2, GJ",
+    ),
+    "planar force": (
+        lambda: ub.Scene([BEAM], loads=[ub.PointLoad(BEAM.end, force=(1, 0))]),
+        "must have 3 components",
+    ),
+    "number as a moment": (
+        lambda: ub.Scene([BEAM], loads=[ub.PointLoad(BEAM.end, moment=1.0)]),
+        "must have 3 components",
+    ),
+    "vector as a moment": (
+        lambda: ub.Scene([PLANAR], loads=[ub.PointLoad(PLANAR.end, moment=(0, 0, 1))]),
+        "must have 1 components",
+    ),
+    "planar support": (
+        lambda: ub.Scene([BEAM], supports=[ub.Roller(BEAM.end)]), "Roller is for scenes",
+    ),
+    "revolute without axis": (
+        lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start), "give axis=(x, y, z)",
+    ),
+    "axis of length zero": (
+        lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start, axis=(0, 0, 0)), "zero length",
+    ),
+    "no such body": (
+        lambda: ub.Body((0, 0, 0), mass=1.0, inertia=(1, 1, 3)), "no body has them",
+    ),
+    "scheme": (
+        lambda: ub.Simulation(ub.Scene([BEAM]), ub.Newmark()), "rotations in space need",
+    ),
+    "degree": (
+        lambda: ub.Simulation(ub.Scene([BEAM]), ub.EnergyMomentum(), mesh=ub.Mesh(degree=2)),
+        "degree 1",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_errors_before_a_run(case):
+    make, words = WRONG[case]
+    with pytest.raises(ub.ModelError, match=re.escape(words)):
+        make()
+
+
+def refused():
+    """Functions that know planar scenes only, by name."""
+    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+    dynamic = {"scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 0.05, "progress": False}
+    run = ub.simulate(scene, **dynamic)
+    control = ub.LoadControl(0.1)
+    return {
+        "plot": lambda: ub.plot(run),
+        "render": lambda: ub.render(run, "unused.png"),
+        "modes": lambda: ub.modes(scene, 1),
+        "follow": lambda: ub.follow(scene, control, steps=1),
+        "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
+        "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),
+        "section forces": lambda: run.section_forces_at(BEAM.end),
+        "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),
+        "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.mesh,
+    }
+
+
+@pytest.mark.serial
+def test_what_is_planar_says_so():
+    for call in refused().values():
+        with pytest.raises(ub.ModelError, match="only for scenes in the plane"):
+            call()

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Unknowns and states of nodes in space.
+
+A node has six unknowns: its displacement, and numbers whose change in a step is the Cayley vector
+of its rotation in axes of the node, see :mod:`ufl_beam.mechanics.spatial_kinematics`.  So rates of
+these numbers are angular velocities in axes of the node, the mass matrix is constant, and C needs
+no rotations.  Quaternions of nodes are states of the elements.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ufl.core.expr import Expr
+
+from ufl_beam.blocks.statement import Inputs
+from ufl_beam.mechanics.spatial_kinematics import Turn, Vector, product, subtract
+
+UNKNOWNS = "xyzabc"
+"""Displacements along the axes of the scene, then rotations about axes of the node."""
+
+
+def unknowns(nodes: int) -> list[str]:
+    """Return the names of the unknowns of nodes, component by component."""
+    return [f"{c}{k}" for c in UNKNOWNS for k in range(nodes)]
+
+
+def quaternion_names(k: int) -> list[str]:
+    """Return the names of the quaternion of a node among the states of an element.
+
+    The first number is the real part minus 1, so that all numbers begin with zero.
+    """
+    return [f"turn {i} of {k}" for i in range(4)]
+
+
+def quaternion(at: Inputs, k: int) -> Vector:
+    """Return the quaternion of a node before the step."""
+    real, *others = (at[name] for name in quaternion_names(k))
+    return (1.0 + real, *others)
+
+
+def vector(at: Inputs, group: str, names: str, k: int) -> Vector:
+    """Return some unknowns of a node in a group of inputs, such as "q1"."""
+    return tuple(at[f"{group} {c}{k}"] for c in names)
+
+
+def change(at: Inputs, names: str, k: int) -> Vector:
+    """Return the change of some unknowns of a node in the step."""
+    return subtract(vector(at, "q1", names, k), vector(at, "q0", names, k))
+
+
+def new_state(turns: Sequence[Turn], to_node: Vector | None = None) -> dict[str, Expr]:
+    """Return the quaternions after the step.
+
+    ``to_node`` is a quaternion that turns the axes of an element into those of its nodes.
+    """
+    found = dict[str, Expr]()
+    for k, turn in enumerate(turns):
+        q = turn.normal if to_node is None else product(turn.normal, to_node)
+        found |= zip(quaternion_names(k), (q[0] - 1.0, *q[1:]), strict=True)
+    return found

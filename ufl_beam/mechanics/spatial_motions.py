@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""Relative motions of two nodes in space, and their variation over a step, in UFL.
+
+They correspond to :mod:`ufl_beam.mechanics.relative_motions`: each function returns the motion at
+the end of the step, zero in the undeformed scene, and its variation.  A vector that is fixed in a
+node changes in a step by s x its mean, with the Cayley vector s of the node.  All motions but
+:func:`turning_in_space` and the length are bilinear in such vectors and in positions, so that
+variations by means of both ends are exact increments.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.mechanics.spatial_kinematics import (
+    Middle,
+    Turn,
+    Vector,
+    add,
+    cross,
+    dot,
+    forces_over_step,
+    matrix,
+    subtract,
+    times,
+)
+from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end
+
+
+class GeometryInSpace(NamedTuple):
+    """Vectors (3,) that a relative motion depends on besides the nodes; m."""
+
+    arm_a: Vector  # from node a to point a, undeformed
+    arm_b: Vector  # from node b to point b, undeformed
+    apart: Vector  # from point a to point b in the undeformed scene
+    axis: Vector  # dimensionless unit vector
+    other: Vector  # unit vector that is fixed in b
+
+
+class NodeInStep:
+    """A node in a step.
+
+    Attributes:
+        u0, u1: Displacements before and after the step.
+        turn: Rotation.
+        w_u, w_θ: Virtual displacement and rotation.
+    """
+
+    def __init__(
+        self, u0: Vector, u1: Vector, turn: Turn, w_u: Vector, w_m: Vector, scheme: Scheme
+    ) -> None:
+        self.u0, self.u1, self.turn, self.w_u = u0, u1, turn, w_u
+        self._scheme, self._frames = scheme, (matrix(turn.q0), matrix(turn.q1))
+        self.w_θ = turn.virtual_rotation(w_m, at_end=acts_at_end(scheme))
+
+    def ends(self, x: Vector) -> tuple[Vector, Vector]:
+        """Return a vector that is fixed in the node, before and after the step."""
+        before, after = (times(frame, x) for frame in self._frames)
+        return before, after
+
+    def variation(self, arm: Vector) -> Vector:
+        """Return the virtual displacement of a point of the node."""
+        return add(self.w_u, cross(self.w_θ, average(self._scheme, *self.ends(arm))))
+
+
+def average(scheme: Scheme, before: Vector, now: Vector) -> Vector:
+    """Return the vector in the variations of a scheme."""
+    return tuple(scheme.average(x, y) for x, y in zip(before, now, strict=True))
+
+
+def _between(a: NodeInStep, b: NodeInStep, n: GeometryInSpace) -> tuple[Vector, Vector]:
+    """Return the vectors from point a to point b, before and after the step."""
+    found = list[Vector]()
+    arms = zip(a.ends(n.arm_a), b.ends(n.arm_b), (a.u0, a.u1), (b.u0, b.u1), strict=True)
+    for arm_a, arm_b, u_a, u_b in arms:
+        moved = add(
+            subtract(u_b, u_a), subtract(subtract(arm_b, n.arm_b), subtract(arm_a, n.arm_a))
+        )
+        found.append(add(n.apart, moved))
+    return found[0], found[1]
+
+
+def _varied(a: NodeInStep, b: NodeInStep, n: GeometryInSpace) -> Vector:
+    return subtract(b.variation(n.arm_b), a.variation(n.arm_a))
+
+
+def parting_in_space(
+    a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
+) -> tuple[Expr, Expr, Expr]:
+    """Return the displacement of b relative to a along a fixed axis; m."""
+    before, now = (dot(n.axis, subtract(d, n.apart)) for d in _between(a, b, n))
+    return before, now, dot(n.axis, _varied(a, b, n))
+
+
+def stretching_in_space(
+    a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
+) -> tuple[Expr, Expr, Expr]:
+    """Return the growth of the distance between the points; m."""
+    ends, length = _between(a, b, n), ufl.sqrt(dot(n.apart, n.apart))
+    lengths = [ufl.sqrt(dot(d, d)) for d in ends]
+    # (d·d - d0·d0) / (|d| + |d0|); a difference of lengths would lose digits
+    moved = [subtract(d, n.apart) for d in ends]
+    before, now = (
+        dot(add(d, n.apart), u) / (size + length)
+        for d, u, size in zip(ends, moved, lengths, strict=True)
+    )
+    along = dot(average(scheme, *ends), _varied(a, b, n))
+    return before, now, along / scheme.average(lengths[0], lengths[1])
+
+
+def sliding_in_space(
+    a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
+) -> tuple[Expr, Expr, Expr]:
+    """Return the displacement of b from a along an axis that is fixed in a; m."""
+    axes, ends = a.ends(n.axis), _between(a, b, n)
+    begun = dot(n.axis, n.apart)
+    before, now = (dot(axis, d) - begun for axis, d in zip(axes, ends, strict=True))
+    axis, between = average(scheme, *axes), average(scheme, *ends)
+    return before, now, dot(axis, _varied(a, b, n)) + dot(a.w_θ, cross(axis, between))
+
+
+def aligning_in_space(
+    a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
+) -> tuple[Expr, Expr, Expr]:
+    """Return the change of the product of an axis that is fixed in a and another fixed in b."""
+    axes, others, begun = a.ends(n.axis), b.ends(n.other), dot(n.axis, n.other)
+    before, now = (dot(x, y) - begun for x, y in zip(axes, others, strict=True))
+    torque = cross(average(scheme, *axes), average(scheme, *others))
+    return before, now, dot(subtract(a.w_θ, b.w_θ), torque)
+
+
+def turning_in_space(
+    a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
+) -> tuple[Expr, Expr, Expr]:
+    """Return the component along an axis, fixed in a and b, of the rotation vector of b; rad."""
+    turns, zero = (a.turn, b.turn), (0.0, 0.0, 0.0)
+    old, now = (Middle(_same, *(getattr(x, q) for x in turns)) for q in ("q0", "q1"))
+    values = [dot(n.axis, middle.rotation_vector) for middle in (old, now)]
+    some = turns
+    if acts_at_end(scheme):
+        old, some = now, (turns[0].at_end, turns[1].at_end)
+    _, of_a, of_b = forces_over_step(_same, some, (old, now), (zero, zero), 1.0, (zero, n.axis))
+    return values[0], values[1], dot(of_a, a.w_θ) + dot(of_b, b.w_θ)
+
+
+def _same(x: Expr) -> Expr:
+    return x
+
+
+SPATIAL_MOTIONS = {
+    motion.__name__.removesuffix("_in_space") + " in space": motion
+    for motion in (
+        parting_in_space, stretching_in_space, sliding_in_space, aligning_in_space,
+        turning_in_space,
+    )
+}  # fmt: skip
+"""Relative motions in space by name."""
