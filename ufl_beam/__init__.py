@@ -82,7 +82,6 @@ from ufl_beam.model.functions import Spline, Table, ramp
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
     Guided,
-    Joint,
     Link,
     Prismatic,
     Release,
@@ -168,7 +167,6 @@ __all__ = [
     "Guided",
     "History",
     "ImposedStrain",
-    "Joint",
     "KelvinVoigt",
     "LineLoad",
     "LinearSoftening",

@@ -16,6 +16,7 @@ from ufl_beam.mechanics.time_scheme import Coefficients, DynamicScheme, Scheme, 
 from ufl_beam.mechanics.time_schemes import EnergyMomentumBase, MidpointDynamics
 from ufl_beam.model import law_functions
 from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.output.recorder import Recorder
@@ -26,6 +27,7 @@ __all__ = [
     "DynamicScheme",
     "EnergyMomentumBase",
     "Equations",
+    "Joint",
     "MaterialLaw",
     "MidpointDynamics",
     "Recorder",

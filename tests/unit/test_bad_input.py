@@ -161,7 +161,7 @@ def joined(*supports):
 def rubbed(pressing):
     """Two beams with friction that is pressed by the force of a joint or a support."""
     rub = ub.Turn(END, BESIDE, ub.Coulomb(coefficient=1.0, joint=pressing))
-    kind = "joints" if isinstance(pressing, ub.Joint) else "supports"
+    kind = "joints" if isinstance(pressing, ub.extend.Joint) else "supports"
     return ub.Scene([GIRDER, RIGHT], connectors=[rub], **{kind: [pressing]})
 
 

@@ -13,7 +13,7 @@ import ufl_beam.structures
 
 @pytest.mark.parametrize(
     ("base", "part"),
-    [(ub.Support, ub.Clamped), (ub.Joint, ub.RigidLink), (ub.Connector, ub.Bushing)],
+    [(ub.Support, ub.Clamped), (ub.extend.Joint, ub.RigidLink), (ub.Connector, ub.Bushing)],
 )
 def test_bases_make_no_parts(base, part):
     assert issubclass(part, base)

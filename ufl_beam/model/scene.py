@@ -78,8 +78,8 @@ class Scene(Record, Rich):
 
     Args:
         beams: The beams.
-        joints: :class:`Rigid`, :class:`Revolute`, :class:`Prismatic`, :class:`RigidLink`,
-            :class:`Link`, :class:`Guided`, :class:`Release`.
+        joints: :class:`Rigid`, :class:`Revolute`, :class:`Spherical`, :class:`Prismatic`,
+            :class:`RigidLink`, :class:`Link`, :class:`Guided`, :class:`Release`.
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Pressure`,

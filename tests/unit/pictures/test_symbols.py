@@ -148,7 +148,7 @@ def test_joints_of_a_user_have_a_plain_symbol():
     left, right, apart = (ub.Beam((x, 0), (x + 1, 0), scenes.SLENDER) for x in (0, 1, 3))
 
     @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-    class Own(ub.Joint):
+    class Own(ub.extend.Joint):
         places: tuple
         shared: tuple
         holders: tuple
