@@ -186,17 +186,17 @@ class Turn(Connector):
     b: PlaceField
     law: LawField
     _: KW_ONLY
-    axis: Any = None
+    axis: Any = (1.0, 0.0)
     name: Text = ""
     motion = "turning"
 
     def __post_init__(self) -> None:
         super().__post_init__()
         in_space = len(self.a.point) == 3
-        if in_space != (self.axis is not None):
+        if in_space == (self.axis == Turn.axis):
             raise ModelError(f"{self}: in space give axis=(x, y, z); in the plane there is none")
-        axis = unit_axis(self.a, self.b, self.axis, "Turn") if in_space else (1.0, 0.0)
-        object.__setattr__(self, "axis", axis)
+        if in_space:
+            object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Turn"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -180,7 +180,7 @@ class Revolute(_AtPoint):
 
     places: tuple[AttachmentPoint, ...]
     multipliers: Switch
-    axis: Any
+    axis: Any = None
 
     def __init__(
         self, *places: AttachmentPoint, multipliers: bool = False,

@@ -161,17 +161,17 @@ class Elimination:
     See substructuring.py.  The entries of ``A`` must not change between :meth:`factor` and the last
     :meth:`expand` after it.  On one process, C uses :attr:`c` directly, see newton.c.
 
+    Blocks of three belong to nodes in the plane; in space, no unknowns are eliminated.
+
     Attributes:
         shared: True for remaining unknowns that other processes have, too.
         c: ``chains`` of loops.h.
     """
 
-    def __init__(self, subdomain: Subdomain, A: Csr) -> None:
+    def __init__(self, subdomain: Subdomain, A: Csr, *, planar: bool = True) -> None:
         ghosts = np.concatenate(subdomain.comm.allgather(subdomain.dofs[subdomain.num_owned :]))
         alone = ~np.isin(subdomain.dofs, ghosts)
-        chains = subdomain.cell_dofs
-        if subdomain.numbering.scene.in_space:
-            chains = np.zeros((0, 6), dtype=np.int32)  # blocks of the elimination are of the plane
+        chains = subdomain.cell_dofs if planar else np.zeros((0, 6), dtype=np.int32)
         pattern = chains, A.indptr, A.indices, alone, subdomain.dofs
         remaining, at, indptr, columns, *arrays = _plan(*pattern, subdomain.num_owned)
         self.dofs, self.shared = subdomain.dofs[remaining], ~alone[remaining]
@@ -211,7 +211,9 @@ class CondensedSolver:
     """
 
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
-        self._elimination, self._is_new, self._good = Elimination(subdomain, A), False, False
+        planar = not subdomain.numbering.scene.in_space
+        self._elimination = Elimination(subdomain, A, planar=planar)
+        self._is_new = self._good = False
         # If only connectors hold a beam, elimination may leave zeros or round-off on the diagonal.
         # Several fronts then exchange too few rows; KLU exchanges enough.
         few_exchanges = not len(subdomain.numbering.multipliers)
