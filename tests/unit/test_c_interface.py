@@ -120,20 +120,6 @@ def test_options_bring_the_solver_of_petsc(make):
     assert lagged.energy.worst < 1e-8
 
 
-def test_reasons_are_those_of_petsc():
-    of_petsc = {
-        "ITERATING": "ITERATING",
-        "AT_ROUND_OFF": "CONVERGED_FNORM_ABS",
-        "CONVERGED": "CONVERGED_FNORM_RELATIVE",
-        "SINGULAR": "DIVERGED_LINEAR_SOLVE",
-        "TOO_MANY": "DIVERGED_MAX_IT",
-        "STALLED": "DIVERGED_LINE_SEARCH",
-        "DIVERGED": "DIVERGED_DTOL",
-    }
-    for mine, theirs in of_petsc.items():
-        assert getattr(lib, mine) == int(getattr(PETSc.SNES.ConvergedReason, theirs))
-
-
 def test_an_interrupt_at_the_door_of_a_callback_is_not_lost():
     """It comes before the first line of what C calls, and cffi would only print it."""
 

@@ -65,7 +65,7 @@ OTHERS = {
     "table": ({"frame": scene(ub.Table((0, 1), (0, 1)))}, "amplitude is Table, in the file func"),
     "scheme": ({"scheme": ub.EnergyMomentum(0.1)}, "scheme.alpha is 0.1, in the file 0.0"),
     "dt": ({"dt": 0.05}, "dt is 0.05, in the file 0.1"),
-    "adaptive": ({"dt": ub.Adaptive(1e-3)}, "is ", ", in the file "),
+    "adaptive": ({"dt": ub.Adaptive(1e-3)}, "dt is Adaptive, in the file 0.1"),
     "beginning": ({"t": (0.1, 0.6)}, "t[0] is 0.1, in the file 0.0"),
     "step": ({"t": (0, 0.45)}, "the step is 0.09 s, in the file 0.1"),
     "newton": ({"newton": ub.Newton(rtol=1e-8)}, "newton.rtol is 1e-08, in the file 1e-10"),

@@ -4,7 +4,6 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
-from drawn import boxes_of, require_apart
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
@@ -38,15 +37,6 @@ def test_a_picture_is_in_the_axes_of_the_user_only(damaged, extremes, name):
     np.testing.assert_array_equal(figure.get_size_inches(), (10, 4))
     with pytest.raises(ub.ArgumentError, match=r"ax = .* must be axes of Matplotlib"):
         draw(name, damaged, extremes, figure)
-
-
-def test_labels_and_legend_are_within_the_axes_of_the_user(damaged):
-    """Of a diagram; the legend covers no label."""
-    axes = Figure(figsize=(6, 5), layout="constrained").subplots()
-    figure = ub.plot(damaged, "M", ax=axes)
-    boxes, legend = boxes_of(figure), axes.get_legend()
-    assert legend.get_texts()[0].get_text() == "M > 0: tension right of the arrow"
-    require_apart([*boxes, legend.get_window_extent()], axes.get_window_extent())
 
 
 def test_colours_suit_a_dark_background(damaged):

@@ -110,21 +110,6 @@ def test_a_fully_open_hinge_is_hollow(law):
     assert mark.get_markerfacecolor() == "white"
 
 
-@pytest.mark.parametrize("what", ["shape", "M"])
-def test_diagrams_mark_hinges_and_yielded_cells(damaged, arm, what):
-    figure = ub.plot(damaged, what, n=50)
-    axes, points = figure.axes[0], damaged.shape(arm, 50)
-    (mark,) = circles(axes)
-    np.testing.assert_allclose(mark.get_xydata()[0], points[0])
-    (zone,) = np.flatnonzero(damaged.material(arm, 50).plastic)
-    bands = [line.get_xydata() for line in axes.lines if line.get_linewidth() > 5]
-    np.testing.assert_allclose(bands, [points[zone : zone + 2]])
-    assert legend(figure)[-2:] == ["yielded or cracked", "hinge, open"]
-    axes = ub.plot(damaged, what, n=1).axes[0]
-    assert not circles(axes)
-    assert not any(line.get_linewidth() > 5 for line in axes.lines)
-
-
 def test_cracks_of_fibres_are_damage():
     law = ub.Fibres(ub.ElastoPlastic(np.inf), number=4, softening=ub.Softening(1e6, 100.0))
     section = ub.Section.rectangle(b=0.1, h=0.2, E=30e9, nu=0.2, fibres=law)
@@ -164,16 +149,6 @@ def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
     assert f"{energy.worst:.1e}".split("e")[0] in title
     losses = {f"lost: {name}" for name in energy.lost}
     assert {*legend(figure)} == {"supplied", "in the scene", *losses} == {*drawn, *losses}
-
-
-def test_dissipation_adds_the_energy_at_the_start():
-    section = ub.Section(1e4, 1e4, 100.0, rhoA=1.0, rhoI=0.01, bending=ub.ElastoPlastic(1e3))
-    beam = ub.Beam((0, 0), (1, 0), section, cells=1)
-    thrown = ub.Scene([beam], initial=[ub.Velocity((beam,), (1.0, 0.0))])
-    solution = ub.simulate(thrown, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05)
-    lines = lines_of(ub.plot(solution, "dissipation"))
-    # 1 kg at 1 m/s, and no work
-    np.testing.assert_allclose(lines["at the start, and supplied"], 0.5, rtol=1e-12)
 
 
 def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):

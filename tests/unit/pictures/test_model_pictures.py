@@ -5,10 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from drawn import STEEL, boxes_of, middles, outlines, require_apart, storeys, texts
+from drawn import STEEL, middles, outlines, texts
 from helpers import raises
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.path import Path
 from scenes import cantilever, clamped, portal, rigid_chain
 
 import ufl_beam as ub
@@ -149,49 +148,6 @@ def test_hinges_are_at_their_places():
     assert texts(figure) == ["dots: hinges may form, from 20 kN m", "beam"]
 
 
-@pytest.mark.parametrize(("bays", "floors", "number"), [(1, 1, 5), (2, 3, 18), (3, 4, 32)])
-def test_labels_cover_neither_beams_nor_each_other(bays, floors, number):
-    scene = storeys(bays, floors)
-    figure = ub.plot(scene)
-    found, axes = boxes_of(figure, "labels"), figure.axes[0]
-    # Members, and a force of each floor; more line loads than 4 are a note
-    assert len(found) == number
-    loads = [text for text in texts(figure) if text.endswith("25 kN/m")]
-    assert loads == ["25 kN/m" if number == 5 else f"{bays * floors} line loads: 25 kN/m"]
-    require_apart(found, axes.get_window_extent())
-    for beam in scene.beams:
-        line = Path(axes.transData.transform(beam.ends))
-        assert not any(line.intersects_bbox(box, filled=False) for box in found)
-
-
-def test_everything_is_within_the_axes():
-    scene = frame(
-        loads=lambda c, g, r: [
-            ub.PointLoad(g.end, force=(5, -5)), ub.PointLoad(r.middle, moment=1),
-        ],
-        supports=lambda c, g, r: [ub.Clamped(c.start)],
-    )  # fmt: skip
-    axes = ub.plot(scene).axes[0]
-    points = np.concatenate([p.vertices for c in axes.collections for p in c.get_paths()])
-    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    assert (points.min(axis=0) > (left, low)).all()
-    assert (points.max(axis=0) < (right, high)).all()
-    box = axes.get_window_extent()
-    assert box.width / box.height == pytest.approx((right - left) / (high - low))  # one scale
-
-
-def test_a_thousand_beams_have_few_artists():
-    """A thousand beams are one collection; their names are left out."""
-    beams = [ub.Beam((i, j), (i + 1, j), STEEL, cells=2) for i in range(40) for j in range(25)]
-    chains = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[25:], strict=False)]
-    load = ub.PointLoad(beams[0].end, force=(0, -1))
-    figure = ub.plot(ub.Scene(beams, joints=chains, loads=[load]))
-    assert len(outlines(figure, "beams")) == 1000
-    assert len(outlines(figure, "pins")) == len(chains)
-    assert texts(figure) == ["1 N"]
-    assert len(figure.axes[0].get_children()) < 40
-
-
 def test_a_section_is_drawn_to_scale():
     """Outline and hole, core, layers and bars; mm from the axis of the beam."""
     cover, core, steel = (ub.Fibres(ub.ElastoPlastic(x), number=8) for x in (3e7, 4e7, 5e8))
@@ -230,10 +186,3 @@ def test_a_section_is_drawn_to_scale():
 def test_wrong_arguments_of_a_model_picture_are_refused(shown, options, words):
     with raises("plot: ", words):
         ub.plot(shown, **options)
-
-
-def test_a_scene_that_contradicts_itself_is_refused_before_it_is_drawn():
-    rotor = ub.Body((0, 0), mass=1.0, inertia=1.0)
-    joints = [ub.Link(ub.ground(x, y), rotor.middle) for x, y in ((1, 0), (0, 1), (1, 1))]
-    with pytest.raises(ub.ArgumentError, match="constraints repeat or contradict each other"):
-        ub.plot(ub.Scene(bodies=[rotor], joints=joints))

@@ -9,7 +9,6 @@ import pytest
 import scenes
 from drawn import FIRST, boxes_of, middles, outlines, require_apart, static, storeys, texts
 from helpers import raises, run
-from matplotlib.path import Path
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -122,26 +121,6 @@ def test_moments_under_a_line_load_are_a_parabola(direction):
     np.testing.assert_allclose(depth, depth.max() * parabola, atol=1e-3)
 
 
-@pytest.mark.parametrize("what", UNIT)
-@pytest.mark.parametrize("direction", [None, 0.0, math.pi / 2], ids=["portal", "beam", "upright"])
-def test_extreme_values_cover_neither_areas_nor_beams_nor_each_other(diagrams, direction, what):
-    figure = diagrams[what] if direction is None else ub.plot(simple_beam(8, direction), what)
-    axes, boxes = figure.axes[0], boxes_of(figure)
-    require_apart(boxes, figure.bbox)
-    for k, box in enumerate(boxes):
-        if axes.texts[k].get_weight() != "bold":
-            continue
-        inside = np.stack(
-            np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 10)), axis=-1
-        ).reshape(-1, 2)
-        for outline in map(Path, areas_of(figure)):
-            outline = outline.transformed(axes.transData)
-            assert not outline.contains_points(inside).any()
-        for line in axes.lines[:3]:
-            drawn = line.get_path().transformed(line.get_transform())
-            assert not drawn.intersects_bbox(box, filled=False)
-
-
 def test_forty_labels_do_not_overlap():
     figure = ub.plot(static(storeys(3, 4)), "M")
     boxes = boxes_of(figure)
@@ -213,24 +192,6 @@ def test_shapes_have_a_bar_of_times(swing):
     # Undeformed, then t = 0, then t = 0.05, which is step 10
     _, _, last = [chain for chain in chains(axes) if len(chain) == len(scene.beams)]
     np.testing.assert_array_equal(last[0], swing.shape(scene.beams[0], 10))
-
-
-def test_shapes_of_a_path_on_a_plateau_have_different_colours():
-    """Beyond its limit the hinge turns at a constant load factor; the bar has load factors."""
-    beam = ub.Beam((0, 0), (2, 0), scenes.SECTION, cells=2, hinges={0.0: ub.ElastoPlastic(10.0)})
-    load = ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)
-    scene = scenes.clamped(beam, loads=[load])
-    path = ub.follow(scene, ub.DisplacementControl(beam.end, "v", -0.025), steps=20, progress=False)
-    assert path.times[-1] == pytest.approx(path.times[10], rel=0.05)
-    figure = ub.plot(path, "shapes", count=5)
-    axes, bar = figure.axes
-    colors = {line.get_color() for line in axes.lines if line.get_zorder() == 3}
-    assert len(colors) == 5
-    greens = sorted(int(color[3:5], 16) for color in colors)
-    assert np.diff(greens).min() > 20
-    assert bar.get_ylabel() == "load factor"
-    last = bar.yaxis.get_major_formatter()(path.progress[-1])
-    assert float(last) == pytest.approx(path.times[-1], rel=5e-3)
 
 
 def test_a_history_has_a_line_for_each_place(swing, engine):

@@ -14,7 +14,7 @@ from matplotlib.path import Path
 
 import ufl_beam as ub
 from ufl_beam.plotting.style import INK, WHITE
-from ufl_beam.plotting.symbols import EDGE, FILLED
+from ufl_beam.plotting.symbols import FILLED
 
 ROD, RAIL, SLEEVE, STRUT, PLAIN = 2.6, 2.2, 2.4, 6.0, 1.6
 """Widths of lines of links, rails and guides, releases, rigid links and other joints; points."""
@@ -48,19 +48,6 @@ def test_outlines_of_bodies_move_rigidly_and_enclose_the_places_of_joints(engine
         # The wheel has turned about the bearing by what the motor gives
         turn = np.exp(3j * engine.times[n] ** 2)
         np.testing.assert_allclose(turning @ [1, 1j], drawn[0] @ [1, 1j] * turn, atol=1e-9)
-
-
-def test_bodies_are_drawn_without_beams(engine, engine_drawn):
-    wheel, block = engine.scene.bodies
-    bearing, _, rod = engine.scene.joints
-    at = [engine.position(p)[-1] for p in (*bearing.places[:1], *rod.places)]
-    for figure in (engine_drawn, ub.plot(engine, "M")):
-        np.testing.assert_allclose(middles(figure, "pins", WHITE), at, atol=1e-12)
-        assert len(outlines(figure, "bodies", fill=FILLED)) == 2
-    marks = outlines(engine_drawn, "centres", fill=EDGE)
-    assert len(marks) == 4  # two quarters each
-    for body, (mark, _) in zip((wheel, block), (marks[:2], marks[2:]), strict=True):
-        assert has(mark, engine.position(body.middle)[-1])
 
 
 def test_a_single_body_is_in_the_picture():
@@ -281,20 +268,3 @@ def test_points_of_the_ground_are_supports(engine_drawn):
     np.testing.assert_allclose((spring[0] + spring[1]) / 2, (4.5, 0.4), atol=1e-12)
     away = np.array([4.5 - 3.2, 0.4 - 0.1])
     assert ((spring - (4.5, 0.4)) @ away > -1e-12).all()
-
-
-def test_a_spring_leaves_the_symbol_of_a_pin_as_it_is():
-    """Ground with a joint that turns is a pin, also if a spring acts there."""
-    beam, ground = ub.Beam((0, 0), (1, 0), scenes.SLENDER), ub.ground(0, 0)
-    pin, spring = ub.Revolute(ground, beam.start), ub.Stretch(ground, beam.at(0.5), ub.Spring(1.0))
-
-    def outline(joints, connectors):
-        held = {"supports": [ub.Clamped(beam.end)], "joints": joints, "connectors": connectors}
-        found = outlines(ub.plot(ub.Scene([beam], **held)), "supports")
-        return [x for x in found if np.abs(x[:, 0]).max() < 0.5]  # without the clamp
-
-    one, other = outline([pin], [spring]), outline([pin], [])
-    assert len(one) == len(other) > 0
-    assert all(map(np.allclose, one, other))
-    alone = outline([], [spring])
-    assert len(alone) != len(one) or not all(map(np.allclose, alone, one))
