@@ -37,7 +37,7 @@ def quaternions(axes: Array) -> Array:
 
 def rotary_inertia(fields: Fields) -> Array:
     """Return the rotary inertia per length about the axes 1, 2, 3 of cells; (n, 3); kg m."""
-    third, second = fields.section_values("rhoI", "rhoI2").T
+    third, second = np.nan_to_num(fields.section_values("rhoI", "rhoI2").astype(float)).T
     return np.stack([second + third, second, third], axis=1)
 
 

@@ -76,7 +76,7 @@ class Beam(Record, Member):
     curve: Curve
     corners: Annotated[tuple[float, ...], require_sequence]
     hinges: Annotated[Mapping[float, HingeLaw | None], partial(require_kind, kind=Mapping)]
-    up: tuple[float, ...] | None
+    up: tuple[float, ...] | None = None
 
     def __init__(
         self, start: Point, end: Point, section: Section, *, cells: int = 8, name: str = "beam",
