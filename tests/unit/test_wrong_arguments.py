@@ -127,6 +127,9 @@ SHAPE = {
     "axis": V("weak", [*TEXT, "x"]),
     "core": V(None, optional(NO_LAW)),
     "cover": V(0.0, [*NUMBER, -1.0, 0.2]),
+    "shear_factor3": V(None, optional(POSITIVE)),
+    "torsion": V(None, optional([*POSITIVE, 10.0])),
+    "centroid_only": V(False, SWITCH),
 }
 FLANGED = {
     "h": V(0.4, POSITIVE),
@@ -173,6 +176,9 @@ TABLE = {
         shear=V(None, optional(NO_LAW)), bending=V(None, optional(NO_LAW)),
         hinge=V(None, optional(NO_SOFTENING)), fibres=V(None, optional(NO_LAW)),
         interaction=V(None, optional(OBJECT)), shape=V(None, optional(OBJECT)),
+        GA3=V(None, optional(POSITIVE)), EI2=V(None, optional(POSITIVE)),
+        GJ=V(None, optional(POSITIVE)), rhoI2=V(None, optional(POSITIVE)),
+        centroid_only=V(False, SWITCH),
     ),
     "Shape": call(
         st.Shape,

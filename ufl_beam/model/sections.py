@@ -64,7 +64,7 @@ class Section(Record):
             along axis 2, ``EI`` and ``rhoI`` are about axis 3.  The resistance of open sections to
             warping is not modelled; runs in space warn of it.
         centroid_only: Accept, in space, a shape whose shear centre is not its centroid.  The offset
-            is not modelled: forces along the axis of the beam cause no torsion.
+            is not modelled: transverse forces at the axis of the beam cause no torsion.
         depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
             rectangle with the same EI/EA.  A beam shorter than depth/√12 causes a warning.
         axial: Inelastic law of the axial force N; N.
@@ -409,8 +409,9 @@ def _torsion_of_rectangle(b: float, h: float) -> float:
     """Return a b³ (1/3 - 64 b/(π⁵ a) Σ tanh(n π a/(2 b))/n⁵), n odd, with the sides a >= b; m⁴."""
     a, b = max(b, h), min(b, h)
     n = np.arange(1, 12, 2)
-    tanh = 31 / 32 * scipy.special.zeta(5.0) - (2 / n**5 / (np.exp(n * np.pi * a / b) + 1)).sum()
-    return float(a * b**3 * (1 / 3 - 64 * b / (np.pi**5 * a) * tanh))
+    from_one = ((1 - np.tanh(n * np.pi * a / (2 * b))) / n**5).sum()
+    series = 31 / 32 * scipy.special.zeta(5.0) - from_one
+    return float(a * b**3 * (1 / 3 - 64 * b / (np.pi**5 * a) * series))
 
 
 def require_positive(owner: str, **sizes: float) -> None:
