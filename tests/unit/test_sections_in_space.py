@@ -88,7 +88,8 @@ def test_circles_and_tubes_have_closed_forms():
 def saint_venant(shape, step):
     """Torsion constant 2 ∫ φ dA by Prandtl's stress function: -Δφ = 2, and one value per hole.
 
-    Five-point formula; straight sides must be lines of the grid.
+    Five-point formula; straight sides must be lines of the grid.  Fillets become stairs, so that
+    the result is too small: at 0.5 mm by 1 to 2 %, and by 4 % for HEA 260.
     """
     outline, *holes = (Path(np.column_stack([z.real, z.imag])) for z in shape.outlines())
     low, high = outline.vertices.min(axis=0), outline.vertices.max(axis=0)

@@ -72,8 +72,8 @@ def i_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
     of ``Section.of_shape``.  By default the shear area is ``tw (h - tf)``, the web, or
     ``5/3 b tf``, the flanges, about the weak axis.  The torsion constant is that of El Darwish and
     Johnston (Proc. ASCE 91, ST1, 1965), as in European tables.  Its error is below 4 % for
-    r <= 1.5 tf, and below 7 % for the HEA with the largest fillets.  Give ``torsion=`` if
-    r > 2 tf, tw > 1.5 tf or b < 2 tw, where the formula does not hold.
+    r <= 1.5 tf and for all sections of :func:`steel`.  Give ``torsion=`` if r > 2 tf, tw > 1.5 tf
+    or b < 2 tw, where the formula does not hold.
 
     Example:
         >>> girder = st.i_shape(h=0.3, b=0.15, tw=0.0071, tf=0.0107, E=210e9, nu=0.3, rho=7850.0)
@@ -176,8 +176,8 @@ def _torsion_of_flanged(
     """Return the torsion constant of an I, C or T by El Darwish and Johnston; m⁴.
 
     The formulas are those of SCI P385.  The result is None where they do not hold: with finite
-    differences of Prandtl's stress function they differ by up to 9 % within the limits below, and
-    by up to 50 % outside.
+    differences of Prandtl's stress function they differ by up to 10 % within the limits below,
+    and by up to 50 % outside.
     """
     w, f = tw / tf, r / tf
     if w > 1.5 or f > 2.0 or b < 2 * tw:
