@@ -25,6 +25,7 @@ NAN, INF, HUGE = math.nan, math.inf, 10**400
 ARRAY = np.array([1.0, 2.0])
 
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
+IN_SPACE = ub.Beam((0, 0, 0), (1, 0, 0), SECTION, cells=2, name="girder")
 OTHER = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="other")
 BODY = ub.Body((2, 0), mass=1.0, inertia=1.0, name="hub")
 SCENE = clamped(BEAM)
@@ -57,6 +58,8 @@ VECTOR = [
     "ab", None, 1.0, (), (1,), (1, 2, 3), (1, "2"), (1, None), (1, NAN), (INF, 0), (1j, 0),
     (HUGE, 0), (ARRAY, ARRAY),
 ]  # fmt: skip
+EITHER = [x for x in VECTOR if x != (1, 2, 3)]
+UP = [1.0, "x", (1,), (0, 1), (0, NAN, 1), object()]
 OBJECT = [None, "x", 1.0, (0, 0), ARRAY, object(), int, [BEAM], STEEL]
 """In the place of any object of this package."""
 NO_PLACE = [*OBJECT, BEAM]
@@ -138,8 +141,11 @@ BY_NAME = {
     **alike(1.0, LIMIT, "eta limit tau"),
     **alike(1.0, optional([*LIMIT, 0.0]), "reloading softening unloading"),
     **alike(2, COUNT, "cells degree every max_iterations max_rows max_states n number steps"),
-    **alike(False, SWITCH, "anew beyond lumped multipliers progress reference tangent turning"),
-    **alike((1, 0), VECTOR, "acceleration angles center force linear point"),
+    **alike(False, SWITCH, "anew beyond centroid_only lumped multipliers progress reference tangent turning"),
+    **alike((1, 0), EITHER, "acceleration center force linear point"),
+    **alike(None, optional(POSITIVE), "GA3 EI2 GJ rhoI2 shear_factor3"),
+    "angles": ((1, 0), VECTOR), "up": (None, UP),
+    "torsion": (None, optional([*POSITIVE, 10.0])),
     **alike(BEAM.end, NO_PLACE, "place rail"), **alike(OTHER.end, NO_PLACE, "slider"),
     **alike(lambda t: t, [*TIME, None], "amplitude motion position"),
     **alike(None, optional(OBJECT), "at checkpoint comm interaction mesh mode negative newton "
@@ -243,11 +249,12 @@ OWN = {
     # joints, connectors and their laws
     "Rigid": CORNER,
     "Revolute": CORNER,
+    "Spherical": {"a": (ub.ground(0, 0, 0), NO_PLACE), "b": (IN_SPACE.start, NO_PLACE)},
     "Release": CORNER | {"free": ("M", [*TEXT, "", "X", "MX"])},
     "Prismatic": {"axis": (None, optional(VECTOR))},
     "RigidLink": PAIR,
     "Link": PAIR,
-    "Turn": PAIR,
+    "Turn": PAIR | {"axis": ((1.0, 0.0), [None, 1.0, "x", (1.0, 1.0), (0, 0, 1), ARRAY])},
     "Stretch": PAIR,
     "Slide": PAIR | {"axis": (None, optional(VECTOR))},
     "Bushing": PAIR | {"axis": ((1, 0), VECTOR), "law": (ub.Clearance(1.0, gap=1.0), OBJECT)},
@@ -286,7 +293,7 @@ OWN = {
     "GroundMotion.corrected": {"degree": (1, [*FROM_ZERO, 1.5, "2"]),
         "highpass": (None, [*optional(POSITIVE), 5.0])},
     "GroundMotion.resampled": {"dt": (0.05, POSITIVE)},
-    "Velocity": {"beams": ([BEAM], LIST), "about": ((0, 0), optional(VECTOR))},
+    "Velocity": {"beams": ([BEAM], LIST), "about": ((0, 0), optional(EITHER))},
     "Scene": {"beams": ([BEAM], LIST), "damping": ((), LIST)},
     # schemes, discretisation, solver, steps
     "EnergyMomentum": {"order": (2, [*NUMBER, 1, 3, 2.5]),
@@ -397,9 +404,11 @@ OWN = {
 
 
 METHODS = {
-    "Section.reinforced": OF_FIBRES.reinforced, "Beam.at": BEAM.at, "Body.at": BODY.at,
+    "Section.reinforced": OF_FIBRES.reinforced, "Beam.at": BEAM.at,
+    "Body.at": lambda x, y: BODY.at(x, y), "ground": lambda x, y: ub.ground(x, y),
     "Rigid": lambda a, b, multipliers: ub.Rigid(a, b, multipliers=multipliers),
     "Revolute": lambda a, b, multipliers: ub.Revolute(a, b, multipliers=multipliers),
+    "Spherical": lambda a, b, multipliers: ub.Spherical(a, b, multipliers=multipliers),
     "GroundMotion.scaled": MOTION.scaled, "GroundMotion.corrected": MOTION.corrected,
     "GroundMotion.resampled": MOTION.resampled,
     "tradeoff.budget": lambda budget: ub.tradeoff(

@@ -23,7 +23,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.cell_functions import mass_forces, stress_forces
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.discretization.model_warnings import warn_of_touching
+from ufl_beam.discretization.model_warnings import warn_of_touching, warn_of_warping
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, ModelWarning, each_warning_once
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
@@ -90,6 +90,7 @@ class Linearization:
                 scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
             )
         warn_of_touching(simulation.numbering)
+        warn_of_warping(scene)
         warn_of_held_motions(scene)
         if t is not None:
             simulation.t = t

@@ -36,7 +36,7 @@ def cell_axes(fields: Fields) -> tuple[Array, Array]:
 
 def rotary_inertia(fields: Fields, axes: Array) -> Array:
     """Return the tensors of rotary inertia per length of cells; (n, 3, 3); kg m."""
-    third, second = fields.section_values("rhoI", "rhoI2").T
+    third, second = np.nan_to_num(fields.section_values("rhoI", "rhoI2").astype(float)).T
     moments = np.stack([second + third, second, third], axis=1)
     return np.einsum("nik,nk,njk->nij", axes, moments, axes)
 

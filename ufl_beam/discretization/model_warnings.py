@@ -54,6 +54,18 @@ def warn_of_masses(scene: Scene) -> None:
         )
 
 
+def warn_of_warping(scene: Scene) -> None:
+    """Warn of open sections in space, whose resistance to warping is not modelled."""
+    beams = scene.beams if scene.in_space else ()
+    warping = [b.name for b in beams if b.section.shape is not None and b.section.shape.is_open]
+    if warping:
+        warn(
+            f"{', '.join(dict.fromkeys(warping[:20]))}: open sections, whose resistance to warping "
+            "is not modelled, so that torsion by GJ alone is too soft near restrained ends. Take "
+            "closed sections if torsion matters, else filter this warning"
+        )
+
+
 def warn_of_rates(scene: Scene) -> None:
     """Warn of virtual works that depend on velocities, such as drag, in a static run."""
     for work in scene.works:

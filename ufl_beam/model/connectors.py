@@ -193,7 +193,7 @@ class Turn(Connector):
     def __post_init__(self) -> None:
         super().__post_init__()
         in_space = len(self.a.point) == 3
-        if in_space == (self.axis == Turn.axis):
+        if in_space == (isinstance(self.axis, tuple) and self.axis == Turn.axis):
             raise ModelError(f"{self}: in space give axis=(x, y, z); in the plane there is none")
         if in_space:
             object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Turn"))

@@ -56,7 +56,11 @@ Instance = Annotated[T, require_kind]
 
 def require_moment(value: Any, what: str) -> float | tuple[float, ...]:
     """Return a moment or angular velocity: a number, or three numbers in space."""
-    return require_number(value, what) if np.ndim(value) == 0 else require_point(value, what)
+    if np.ndim(value) == 0:
+        return require_number(value, what)
+    if len(value) != 3:
+        raise ArgumentError(f"{what} = {value} must be a number, or three numbers in space")
+    return require_point(value, what)
 
 
 NAMING = ("name", "place", "beam", "a", "b", "rail", "slider")

@@ -415,10 +415,18 @@ def require_space(scene: Scene) -> None:
             )
     for beam in scene.beams:
         section = beam.section
-        if missing := [x for x in ("GA3", "EI2", "GJ") if getattr(section, x) is None]:
+        names = "GA3", "EI2", "GJ", *(("rhoI2",) if section.rhoI else ())
+        if missing := [x for x in names if getattr(section, x) is None]:
             raise ModelError(
-                f"{beam.name}: its section has no {', '.join(missing)}, stiffnesses of beams in "
-                "space; give Section(GA3=, EI2=, GJ=), or Section.rectangle, circle or tube"
+                f"{beam.name}: its section has no {', '.join(missing)} of beams in space; give "
+                "Section(GA3=, EI2=, GJ=, rhoI2=), Section.of_shape(shear_factor3=, torsion=), or "
+                "a shape with these numbers, such as Section.rectangle or structures.steel"
+            )
+        if section.shape and not section.shape.is_point_symmetric and not section.centroid_only:
+            raise ModelError(
+                f"{beam.name}: the shear centre of its section is not the centroid, and scenes in "
+                "space do not model this offset; make the section with centroid_only=True to "
+                "ignore it, or take a section whose shear centre is its centroid"
             )
         if beam.hinges or section.section_points(section.hinge):
             raise ModelError(

@@ -14,6 +14,7 @@ from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
+import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, Moved
@@ -27,7 +28,7 @@ from ufl_beam.model.checks import (
 from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints, by_class
 from ufl_beam.model.material_law import MaterialLaw, require_law
 from ufl_beam.model.material_laws import ElastoPlastic
-from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.records import Instance, NotNegative, Positive, Record, Switch
 from ufl_beam.model.shapes import (
     Shape,
     rounded_rectangle,
@@ -60,8 +61,10 @@ class Section(Record):
         rhoI: Rotary inertia per length; kg m.
         GA3, EI2, GJ, rhoI2: In space, stiffness against shear along axis 3, bending about axis 2,
             and torsion, and rotary inertia about axis 2; N, N m², N m², kg m.  ``GA`` is for shear
-            along axis 2, ``EI`` and ``rhoI`` are about axis 3.  Warping, and shear centres away
-            from the centroid, are not modelled.
+            along axis 2, ``EI`` and ``rhoI`` are about axis 3.  The resistance of open sections to
+            warping is not modelled; runs in space warn of it.
+        centroid_only: Accept, in space, a shape whose shear centre is not its centroid.  The offset
+            is not modelled: transverse forces at the axis of the beam cause no torsion.
         depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
             rectangle with the same EI/EA.  A beam shorter than depth/√12 causes a warning.
         axial: Inelastic law of the axial force N; N.
@@ -106,6 +109,7 @@ class Section(Record):
     EI2: Annotated[float | None, require_stiffness] = None
     GJ: Annotated[float | None, require_stiffness] = None
     rhoI2: Annotated[float | None, require_stiffness] = None
+    centroid_only: Switch = False
     massless_by_default: bool = field(init=False, repr=False)
 
     steel = Moved("ufl_beam.structures.steel")
@@ -171,17 +175,27 @@ class Section(Record):
     @classmethod
     def _from_material(
         cls, A: float, I: float, E: float, nu: float, rho: float | None, shear_factor: float,
-        *, fibres: PlacedFibres | None, **more: Any,
+        *, fibres: PlacedFibres | None, I2: float | None = None, torsion: float | None = None,
+        shear_factor3: float | None = None, **more: Any,
     ) -> Section:  # fmt: skip
         require_number(shear_factor, "Section: shear_factor", positive=True)
+        require_stiffness(shear_factor3, "Section: shear_factor3")
         if rho is not None:
             require_number(rho, "Section: rho", at_least=0.0)
-            more |= {"rhoA": rho * A, "rhoI": rho * I}
+            more |= {"rhoA": rho * A, "rhoI": rho * I, "rhoI2": (I2 and rho * I2) or None}
         if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
             raise ModelError(f"Section: nu = {nu} must lie in (-1, 0.5]")
         if rho:
             plausibility.check_material(E, rho)
         GA = shear_factor * A * E / (2 * (1 + nu))
+        if I2 is not None:
+            more["EI2"] = E * I2
+        if shear_factor3 is not None:
+            more["GA3"] = shear_factor3 * A * E / (2 * (1 + nu))
+        if torsion is not None:
+            polar = (I + (I2 or 0.0)) * (1 + 1e-9)
+            require_number(torsion, "Section: torsion", positive=True, at_least=0.0, at_most=polar)
+            more["GJ"] = torsion * E / (2 * (1 + nu))
         EA, EI = (E * A, E * I) if fibres is None else (fibres.EA, fibres.EI)
         return cls(EA=EA, GA=GA, EI=EI, fibres=fibres, **more)
 
@@ -189,12 +203,14 @@ class Section(Record):
     def of_shape(
         cls, shape: Shape, *, E: float, nu: float, rho: float | None = None, shear_factor: float,
         axis: str = "strong", fibres: Fibres | None = None, core: Fibres | None = None,
-        cover: float = 0.0, **laws: Any,
+        cover: float = 0.0, shear_factor3: float | None = None, torsion: float | None = None,
+        centroid_only: bool = False, **laws: Any,
     ) -> Section:  # fmt: skip
         """Create a section of an isotropic material.
 
-        The other constructors of shapes call this one; most have their own default of
-        ``shear_factor``.  The axis of the beam runs through the centroid.
+        The other constructors of shapes call this one; most have their own defaults of
+        ``shear_factor``, ``shear_factor3`` and ``torsion``.  The axis of the beam runs through the
+        centroid.
 
         Args:
             shape: Shape that bends in the plane of its y.
@@ -207,6 +223,10 @@ class Section(Record):
             fibres: Law and number of layers across y.
             core: Law of the fibres farther than ``cover`` from the surface; for confined concrete.
             cover: Distance of the core from the surface; m.
+            shear_factor3: In space, shear area along axis 3 divided by the area, for GA3.
+            torsion: In space, torsion constant, for GJ; m⁴.  Of closed shapes and bars it is at
+                most the polar moment ``shape.I + shape.I2``, of open shapes much smaller.
+            centroid_only: See :class:`Section`.
             laws: ``axial``, ``shear``, ``bending``, ``hinge``, ``interaction`` of :class:`Section`.
 
         Raises:
@@ -227,12 +247,15 @@ class Section(Record):
         for name in set(laws) - LAWS:
             raise ModelError(
                 f"Section of a shape has no argument {name!r}; the arguments are E, nu, rho, "
-                f"shear_factor, axis, fibres, core, cover, {', '.join(sorted(LAWS))}"
+                f"shear_factor, shear_factor3, torsion, axis, fibres, core, cover, centroid_only, "
+                f"{', '.join(sorted(LAWS))}"
             )
+        I2 = shape.I2 if axis == "strong" else shape.I
         shape = copy(shape) if axis == "strong" else shape.turned()
         return cls._from_material(
             shape.A, shape.I, E, nu, rho, shear_factor, depth=shape.top - shape.bottom,
-            fibres=PlacedFibres.layers(fibres, E, shape, core, cover), shape=shape, **laws,
+            fibres=PlacedFibres.layers(fibres, E, shape, core, cover), shape=shape, I2=I2,
+            shear_factor3=shear_factor3, torsion=torsion, centroid_only=centroid_only, **laws,
         )  # fmt: skip
 
     @classmethod
@@ -304,6 +327,7 @@ class Section(Record):
         measured from mid-depth, or from the origin of a :class:`Shape` or of :meth:`of_fibres`.
         The axis moves to the centroid of the stiffness EA, at y = ``fibres.axis`` of the new
         section.  GA and mass do not change: the density of reinforced concrete includes the bars.
+        EI2 becomes None, because it depends on the bars' coordinates across y.
 
         Args:
             y: Coordinates of the bars, or of rows of bars; m.
@@ -335,39 +359,59 @@ class Section(Record):
             raise ModelError(f"{what}: y and A must be lists of equal length, with positive areas")
         placed = self.fibres.with_bars(fibres, E, at, areas)
         rhoA: Any = None if self.massless_by_default else self.rhoA
-        return replace(self, EA=placed.EA, EI=placed.EI, rhoA=rhoA, fibres=placed)
+        return replace(self, EA=placed.EA, EI=placed.EI, EI2=None, rhoA=rhoA, fibres=placed)
 
     @classmethod
     def rectangle(cls, b: float, h: float, **material: Any) -> Section:
         """Create a rectangle of width ``b`` and depth ``h``, the size in the plane of motion; m.
 
-        ``material`` are arguments of :meth:`of_shape`; the shear factor is 5/6 by default.
+        ``material`` are arguments of :meth:`of_shape`; the shear factors are 5/6 by default, and
+        the torsion constant is Saint-Venant's series.
         """
         require_positive("Section.rectangle", b=b, h=h)
-        return cls.of_shape(rounded_rectangle(b, h, 0.0), **{"shear_factor": 5 / 6} | material)
+        return _bar(rounded_rectangle(b, h, 0.0), 5 / 6, _torsion_of_rectangle(b, h), material)
 
     @classmethod
     def circle(cls, d: float, **material: Any) -> Section:
         """Create a solid circle of diameter ``d``; m.
 
-        ``material`` are arguments of :meth:`of_shape`; the shear factor is 9/10 by default.
+        ``material`` are arguments of :meth:`of_shape`; the shear factors are 9/10 by default, and
+        the torsion constant is the polar moment.
         """
         require_positive("Section.circle", d=d)
-        return cls.of_shape(rounded_rectangle(d, d, d / 2), **{"shear_factor": 9 / 10} | material)
+        shape = rounded_rectangle(d, d, d / 2)
+        return _bar(shape, 9 / 10, 2 * shape.I, material)
 
     @classmethod
     def tube(cls, d: float, t: float, **material: Any) -> Section:
         """Create a circular tube of outer diameter ``d`` and wall thickness ``t``; m.
 
-        ``material`` are arguments of :meth:`of_shape`; the shear factor is 1/2 by default, by
-        Cowper (1966) for thin walls and Poisson's ratio 0.
+        ``material`` are arguments of :meth:`of_shape`; the shear factors are 1/2 by default, by
+        Cowper (1966) for thin walls and Poisson's ratio 0, and the torsion constant is the polar
+        moment.
         """
         require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
             raise ModelError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
             )
-        return cls.of_shape(rounded_rectangle(d, d, d / 2, t), **{"shear_factor": 1 / 2} | material)
+        shape = rounded_rectangle(d, d, d / 2, t)
+        return _bar(shape, 1 / 2, 2 * shape.I, material)
+
+
+def _bar(shape: Shape, factor: float, torsion: float, material: dict[str, Any]) -> Section:
+    """Create a section with defaults of both shear factors and of the torsion constant; m⁴."""
+    defaults = {"shear_factor": factor, "shear_factor3": factor, "torsion": torsion}
+    return Section.of_shape(shape, **defaults | material)
+
+
+def _torsion_of_rectangle(b: float, h: float) -> float:
+    """Return a b³ (1/3 - 64 b/(π⁵ a) Σ tanh(n π a/(2 b))/n⁵), n odd, with the sides a >= b; m⁴."""
+    a, b = max(b, h), min(b, h)
+    n = np.arange(1, 12, 2)
+    from_one = ((1 - np.tanh(n * np.pi * a / (2 * b))) / n**5).sum()
+    series = 31 / 32 * scipy.special.zeta(5.0) - from_one
+    return float(a * b**3 * (1 / 3 - 64 * b / (np.pi**5 * a) * series))
 
 
 def require_positive(owner: str, **sizes: float) -> None:

@@ -64,6 +64,7 @@ class Shape(Record):
         A: Area; m².
         y: Coordinate y of the centroid; m.
         I: Second moment of area about the centroid; m⁴.
+        I2: Second moment of area about the axis of y, for bending out of the plane; m⁴.
         Wel: Elastic section modulus, I over the largest distance from the centroid; m³.
         Wpl: Plastic section modulus, the plastic moment without axial force over the yield stress;
             m³.
@@ -258,6 +259,13 @@ class Shape(Record):
         """Second moment of area; m⁴."""
         return self._moments[1]
 
+    @cached_property
+    def I2(self) -> float:
+        """Second moment of area about the axis of y through the centroid; m⁴."""
+        _, weights, x, signs = self._strips
+        S, I2 = (float(weights @ (signs * x**k).sum(axis=0)) / k for k in (2, 3))
+        return I2 - S**2 / self.A
+
     @property
     def Wel(self) -> float:
         """Elastic section modulus; m³."""
@@ -277,6 +285,25 @@ class Shape(Record):
         """Product of inertia ∫ x y dA, divided by the second moment ∫ y² dA."""
         y, weights, x, signs = self._strips
         return float(weights @ (y * (signs * x**2).sum(axis=0)) / 2 / self.I)
+
+    # -- torsion -------------------------------------------------------------------------------
+
+    @property
+    def is_open(self) -> bool:
+        """True for a shape without holes that is not convex, such as an I, a C or a T."""
+        x, y, _ = np.transpose(self._loops[0])
+        sides = np.roll(x + 1j * y, -1) - (x + 1j * y)
+        turns = (np.roll(sides, 1).conj() * sides).imag
+        return not self.holes and bool(turns.min() < -1e-9 * turns.max())
+
+    @property
+    def is_point_symmetric(self) -> bool:
+        """True if half a turn maps the shape onto itself; its shear centre is then its centroid."""
+        corners = np.array([corner for loop in self._loops for corner in loop])
+        centre = np.append(corners[:, :2].mean(axis=0), 0.0)
+        turned = corners * (-1.0, -1.0, 1.0) + 2 * centre
+        apart = np.abs(corners[:, None] - turned).max(axis=2).min(axis=1)
+        return bool((apart < 1e-9 * np.ptp(corners[:, :2])).all())
 
 
 def _pieces(loop: Sequence[Sequence[float]]) -> list[Piece]:

@@ -201,16 +201,23 @@ def require_no_code(data: Data) -> None:
             )
 
 
-def add_new_fields(data: Data) -> Data:
-    """Add the fields of the package's classes that are newer than the data, with their defaults."""
-    for record in data["records"]:
+def add_new_fields(data: Data, present: Data = None) -> Data:
+    """Add the fields of the package's classes that are newer than the data, with their defaults.
+
+    A number that is None by default, such as ``Section(GJ=)``, was not known: it is taken from
+    ``present``, the data of a scene that is to be compared.
+    """
+    others = {} if present is None else dict(enumerate(present["records"]))
+    for i, record in enumerate(data["records"]):
         kind = None if "from" in record else record_class(record["is"])
         for field in dataclasses.fields(kind) if kind else ():
             made, missing = field.default_factory, dataclasses.MISSING
             value = field.default if made is missing else made()
             default = {} if value is missing else to_data(value)
             if field.init and not default.get("records", True):  # a number, a text or the like
-                record.setdefault(field.name, default["root"])
+                number = others.get(i, {}).get(field.name) if default["root"] is None else None
+                known = number if isinstance(number, float | int) else default["root"]
+                record.setdefault(field.name, known)
     return data
 
 

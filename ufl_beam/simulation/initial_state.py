@@ -19,6 +19,7 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_origin,
     warn_of_rates,
     warn_of_touching,
+    warn_of_warping,
 )
 from ufl_beam.discretization.state_io import OtherVersion, State
 from ufl_beam.discretization.state_transfer import (
@@ -85,6 +86,7 @@ def checked_numbering(
             require_no_prestress(scene, repr(scheme), instead)
     if scene.in_space:
         require_for_space(scheme)
+        warn_of_warping(scene)
         return DofNumbering(scene, mesh), ""
     require_works(scene, mesh.degree, scheme)
     require_independent(scene)

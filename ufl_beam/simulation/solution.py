@@ -316,7 +316,8 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
     solution = kinds[content["kind"]](numbering.scene, numbering)
     solution._set_content(content)
     if scene is not None:
-        scenes = solution._content()["scene"], add_new_fields(content["scene"])
+        present = solution._content()["scene"]
+        scenes = present, add_new_fields(content["scene"], present)
         now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in scenes)
         if differs := difference(now, then):
             raise WrongReader(

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from functools import cache, lru_cache
 from pathlib import Path
@@ -69,47 +70,56 @@ def i_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
 
     ``r`` is the radius of the fillets between web and flanges; m.  ``material`` are arguments
     of ``Section.of_shape``.  By default the shear area is ``tw (h - tf)``, the web, or
-    ``5/3 b tf``, the flanges, about the weak axis.
+    ``5/3 b tf``, the flanges, about the weak axis.  The torsion constant is that of El Darwish and
+    Johnston (Proc. ASCE 91, ST1, 1965), as in European tables.  Its error is below 4 % for
+    r <= 1.5 tf and for all sections of :func:`steel`.  Give ``torsion=`` if r > 2 tf, tw > 1.5 tf
+    or b < 2 tw, where the formula does not hold.
 
     Example:
         >>> girder = st.i_shape(h=0.3, b=0.15, tw=0.0071, tf=0.0107, E=210e9, nu=0.3, rho=7850.0)
     """
     shape, _ = _flanged("I", h, b, tw, tf, r)
-    area = 5 / 3 * b * tf if material.get("axis") == "weak" else tw * (h - tf)
-    return Section.of_shape(shape, **{"shear_factor": area / shape.A} | material)
+    torsion = _torsion_of_flanged("I", h, b, tw, tf, r)
+    return _profile(shape, (tw * (h - tf), 5 / 3 * b * tf), torsion, material)
 
 
 def channel(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any) -> Section:
     """Create a channel with parallel flanges, with the dimensions of :func:`i_shape`.
 
     About the weak axis, the web is to the right of the direction of the beam.  ``material`` are
-    arguments of ``Section.of_shape``; the default of the shear factor is Cowper's (1966) for thin
-    walls and Poisson's ratio 0.
+    arguments of ``Section.of_shape``; the defaults of the shear factors are Cowper's (1966) for
+    thin walls and Poisson's ratio 0, and of the torsion constant that of :func:`i_shape`.  Scenes
+    in space need ``centroid_only=True``, because the shear centre is behind the web.
 
     Example:
         >>> purlin = st.channel(h=0.2, b=0.08, tw=0.006, tf=0.011, E=210e9, nu=0.3, rho=7850.0)
     """
-    return _thin_walled(*_flanged("C", h, b, tw, tf, r), material)
+    shape, walls = _flanged("C", h, b, tw, tf, r)
+    return _profile(shape, _shear_areas(walls), _torsion_of_flanged("C", h, b, tw, tf, r), material)
 
 
 def t_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any) -> Section:
     """Create a T: depth h with the flange of width b and thickness tf, thickness tw of the web.
 
     The flange is to the left of the direction of the beam; ``r`` is the radius of the fillets;
-    m.  ``material`` are arguments of ``Section.of_shape``; the default of the shear factor is
-    Cowper's (1966) for thin walls and Poisson's ratio 0.
+    m.  ``material`` are arguments of ``Section.of_shape``; the defaults of the shear factors are
+    Cowper's (1966) for thin walls and Poisson's ratio 0, and of the torsion constant that of
+    :func:`i_shape`.  Scenes in space need ``centroid_only=True``, because the shear centre is in
+    the flange.
 
     Example:
         >>> stiffener = st.t_shape(h=0.1, b=0.1, tw=0.01, tf=0.01, E=210e9, nu=0.3, rho=7850.0)
     """
-    return _thin_walled(*_flanged("T", h, b, tw, tf, r), material)
+    shape, walls = _flanged("T", h, b, tw, tf, r)
+    return _profile(shape, _shear_areas(walls), _torsion_of_flanged("T", h, b, tw, tf, r), material)
 
 
 def box(b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Section:
     """Create a rectangular hollow section: width b, depth h, wall t, outer corner radius r; m.
 
-    The inner radius is r - t, or 0.  ``material`` are arguments of ``Section.of_shape``;
-    the default of the shear factor is Cowper's (1966) for thin walls and Poisson's ratio 0.
+    The inner radius is r - t, or 0.  ``material`` are arguments of ``Section.of_shape``; the
+    defaults of the shear factors are Cowper's (1966) for thin walls and Poisson's ratio 0, and of
+    the torsion constant that of EN 10210-2.
 
     Example:
         >>> column = st.box(b=0.2, h=0.3, t=0.01, r=0.02, E=210e9, nu=0.3, rho=7850.0)
@@ -122,7 +132,12 @@ def box(b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Sectio
         raise ModelError(f"box: two walls do not fit: b = {b}, h = {h}, t = {t} m")
     if 2 * r > min(b, h):
         raise ModelError(f"box: r = {r} m does not fit: b = {b}, h = {h} m")
-    return _thin_walled(rounded_rectangle(b, h, r, t), box_walls(b, h, t), material)
+    areas = [thin_walled_shear_area(box_walls(*sides, t)) for sides in ((b, h), (h, b))]
+    corner = (r + max(r - t, 0.0)) / 2
+    length = 2 * (b + h - 2 * t) - 2 * corner * (4 - math.pi)
+    enclosed = (b - t) * (h - t) - corner**2 * (4 - math.pi)
+    torsion = t**3 * length / 3 + 4 * enclosed**2 * t / length
+    return _profile(rounded_rectangle(b, h, r, t), areas, torsion, material)
 
 
 def _flanged(kind: str, h: float, b: float, tw: float, tf: float, r: float) -> tuple[Shape, Walls]:
@@ -140,11 +155,43 @@ def _flanged(kind: str, h: float, b: float, tw: float, tf: float, r: float) -> t
     return flanged(kind, h, b, tw, tf, r)
 
 
-def _thin_walled(shape: Shape, walls: Walls, material: dict[str, Any]) -> Section:
-    if material.get("axis") == "weak":
-        walls = [(1j * start, 1j * end, t) for start, end, t in walls]
-    factor = thin_walled_shear_area(walls) / shape.A
-    return Section.of_shape(shape, **{"shear_factor": factor} | material)
+def _profile(
+    shape: Shape, areas: Sequence[float], torsion: float | None, material: dict[str, Any]
+) -> Section:
+    """Create a section with defaults of its shear areas (m²) and torsion constant (m⁴)."""
+    own, other = areas[::-1] if material.get("axis") == "weak" else areas
+    factors = {"shear_factor": own / shape.A, "shear_factor3": other / shape.A}
+    return Section.of_shape(shape, **factors | {"torsion": torsion} | material)
+
+
+def _shear_areas(walls: Walls) -> list[float]:
+    """Return the shear areas about the strong and the weak axis of walls; m²."""
+    turned = [(1j * start, 1j * end, t) for start, end, t in walls]
+    return [thin_walled_shear_area(walls), thin_walled_shear_area(turned)]
+
+
+def _torsion_of_flanged(
+    kind: str, h: float, b: float, tw: float, tf: float, r: float
+) -> float | None:
+    """Return the torsion constant of an I, C or T by El Darwish and Johnston; m⁴.
+
+    The formulas are those of SCI P385.  The result is None where they do not hold: with finite
+    differences of Prandtl's stress function they differ by up to 10 % within the limits below,
+    and by up to 50 % outside.
+    """
+    w, f = tw / tf, r / tf
+    if w > 1.5 or f > 2.0 or b < 2 * tw:
+        return None
+    flanges = 1 if kind == "T" else 2
+    if kind == "C":
+        alpha = -0.0908 + 0.2621 * w + 0.1231 * f - 0.0752 * w * f - 0.0945 * w**2
+        D = 2 * (3 * r + tw + tf - math.sqrt(2 * (2 * r + tw) * (2 * r + tf)))
+    else:
+        alpha = -0.042 + 0.2204 * w + 0.1355 * f - 0.0865 * w * f - 0.0725 * w**2
+        D = ((tf + r) ** 2 + (r + tw / 4) * tw) / (2 * r + tf)
+    flange = b * tf**3 / 3 + alpha * D**4 - 0.21 * tf**4
+    foot = 0.105 * tw**4 if kind == "T" else 0.0
+    return flanges * flange + (h - flanges * tf) * tw**3 / 3 - foot
 
 
 def _similar(name: str, table: Iterable[str]) -> list[str]:
