@@ -305,10 +305,7 @@ BLOWN = replace(PLAIN, loads=[ub.Pressure(BEAM, normal=1.0)])
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda run: ub.modes(PLAIN, 0), "modes: n = 0 must be"),
-        (lambda run: ub.modes(BEAM, 2), " is not a Scene"),
         (lambda run: ub.modes(cantilever(4), 2, at=run), "modes: at is a solution of other beams"),
-        (lambda run: ub.modes(PLAIN, 2, at=2.0), "modes: at = 2.0 is not a Solution"),
         (lambda run: ub.modes(TURNING, 1), "RotatingFrame; give "),
         (lambda run: ub.modes(MASSLESS, 1), "nothing that can move has mass"),
         (lambda run: ub.modes(PLAIN, 3).shape(3, BEAM.end), "there is no shape 3; there are 3"),
@@ -316,7 +313,6 @@ BLOWN = replace(PLAIN, loads=[ub.Pressure(BEAM, normal=1.0)])
         (lambda run: ub.buckling(FREE, 1), "free to move in 3 independent ways"),
         (lambda run: ub.buckling(TURNING, 1), "the RotatingFrame has a stiffness of its own"),
         (lambda run: ub.buckling(BLOWN, 1), "the Pressure has a stiffness of its own"),
-        (lambda run: ub.RotatingFrame(math.inf), "RotatingFrame: rate = inf is not finite"),
     ],
 )
 def test_wrong_calls_are_refused(call, words):

@@ -99,8 +99,6 @@ def test_names_tell_connectors_of_the_same_places_apart(shared_path, on_first_ra
     assert loaded[0].law.free == -0.2
     texts = [text.get_text() for text in ub.plot(scene).axes[0].texts]
     assert {"spring", "damper", "stop"} <= {text.split(",")[0] for text in texts}
-    with raises("name", kind=ub.ModelError):
-        ub.Turn(ub.ground(0, 0), body.middle, ub.Spring(1.0), name=3)
     law = ub.Clearance(stiffness=1e5, gap=1e-3)
     pin = ub.Bushing(ub.ground(1, 0), body.middle, law, name="pin")
     assert {str(x) for x in pin.components} == {str(pin)} == {"pin"}

@@ -9,7 +9,6 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
-from helpers import raises
 
 import ufl_beam as ub
 
@@ -119,12 +118,6 @@ def test_a_later_call_is_named_with_its_time(kind, scheme):
 def test_the_first_call_is_named(law, words, scheme):
     for value in WRONG:
         assert f"{TURN}{words} {value}" in failure_of(turned(law)(value), scheme)[1]
-
-
-@pytest.mark.parametrize("value", WRONG)
-def test_a_time_function_is_asked_before_a_run(value):
-    with raises(f"the time function is {value} at t = 0"):
-        ub.PrescribedMotion(lambda t: value)
 
 
 def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
