@@ -178,7 +178,7 @@ def test_packages_beside_this_one_have_their_places(module):
         assert [x for x in reach(module) if outside(x) & FINITE_ELEMENTS] == []
 
 
-def test_each_c_file_belongs_to_a_subpackage():
+def test_c_files_belong_to_subpackages_and_call_no_higher_ones():
     (sources,) = (
         ast.literal_eval(node.value)
         for node in nodes("compiled.c_library")
@@ -186,9 +186,6 @@ def test_each_c_file_belongs_to_a_subpackage():
     )
     assert sorted(" ".join(C_FILES.values()).split()) == sorted(sources)
     assert {*STEPS, "newton", "add_block", "update_ghosts"} <= {*c_functions()}
-
-
-def test_c_functions_call_no_higher_subpackage():
     for function, (of, calls) in c_functions().items():
         assert [x for x in calls if above(of, c_functions()[x][0])] == [], function
 

@@ -1,11 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""200 random scenes, each stated in six ways: one result, constraints kept, a ledger that closes.
-
-``python3 test_random_scenes.py SEED`` prints the scripts of a scene with their differences.
-"""
+"""200 random scenes, each stated in six ways: one result, constraints kept, a closed ledger."""
 
 import math
-import sys
 import warnings
 from dataclasses import replace
 
@@ -204,11 +200,3 @@ def test_all_statements_of_a_scene_give_one_result(seed):
 def test_nearly_all_scenes_are_regular():
     """The same of all; nearly all are regular, so that comparing them shows something."""
     assert sum(check(seed)[1] > CHAOTIC for seed in ALL) <= 0.05 * len(ALL)
-
-
-if __name__ == "__main__":
-    number = int(sys.argv[1])
-    for one in (AS_GIVEN, *changed_statements(number)):
-        print(script(number, one))
-    found, *numbers = compare(number)
-    print(found["as given"].solution, *numbers, found["as given"].failure, sep="\n")
