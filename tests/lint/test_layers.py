@@ -76,10 +76,6 @@ def nodes(module):
     return list(ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8"))))
 
 
-def names_in(module):
-    return {node.id for node in nodes(module) if isinstance(node, ast.Name)}
-
-
 @cache
 def imports(module):
     """Names that a module imports anywhere, also for type checkers."""
@@ -171,14 +167,14 @@ def test_packages_beside_this_one_have_their_places(module):
     found, of = outside(module), subpackage(module)
     if module != "dolfinx_compat":
         assert "dolfinx" not in found or of == "reference"
-        assert "VERSION" not in names_in(module)
+        assert "VERSION" not in {getattr(node, "id", "") for node in nodes(module)}
     assert "petsc4py" not in found or {module, of} & PETSC
     assert not found & {"matplotlib", "pyvista", "PIL"} or module.startswith(DRAWING)
     if of == "model":  # also through other modules of the package
         assert [x for x in reach(module) if outside(x) & FINITE_ELEMENTS] == []
 
 
-def test_each_c_file_belongs_to_a_subpackage():
+def test_c_files_belong_to_subpackages_and_call_no_higher_ones():
     (sources,) = (
         ast.literal_eval(node.value)
         for node in nodes("compiled.c_library")
@@ -186,9 +182,6 @@ def test_each_c_file_belongs_to_a_subpackage():
     )
     assert sorted(" ".join(C_FILES.values()).split()) == sorted(sources)
     assert {*STEPS, "newton", "add_block", "update_ghosts"} <= {*c_functions()}
-
-
-def test_c_functions_call_no_higher_subpackage():
     for function, (of, calls) in c_functions().items():
         assert [x for x in calls if above(of, c_functions()[x][0])] == [], function
 

@@ -135,7 +135,10 @@ class _Writer(Draws):
         kind, limit = self._section(i)
         name = f"beam{i}"
         parent = self._one(self._anchors) if i else None
-        joint = self._joint_kind()
+        kinds = ["Rigid", "Rigid", "Revolute", "RigidLink"]
+        if not self._static:
+            kinds[3:] = ["Prismatic", "RigidLink", "Link", "Release"]
+        joint = self._one(kinds)
         apart = joint in ("RigidLink", "Link")
         start = f"{parent}.point" if i else "(0.0, 0.0)"
         if i and apart:
@@ -168,12 +171,6 @@ class _Writer(Draws):
         self._join(joint, parent, f"{name}.at(bx{i}, by{i})")
         self._add("bodies", name)
         self._anchors.append(f"{name}.at(bx{i} + {self._L / 5:.6g}, by{i})")
-
-    def _joint_kind(self):
-        kinds = ["Rigid", "Rigid", "Revolute", "RigidLink"]
-        if not self._static:
-            kinds[3:] = ["Prismatic", "RigidLink", "Link", "Release"]
-        return self._one(kinds)
 
     def _join(self, kind, a, b, beam=None):
         """A joint; in statics, what turns is held by a connector."""
