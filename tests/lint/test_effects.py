@@ -35,6 +35,11 @@ OTHERS = {
 NAMES = {"name", "depth", "shape"}
 """Fields that are for messages, pictures and section tables."""
 
+IN_SPACE = {
+    "Spherical", "Beam.up", "Revolute.axis", "Turn.axis", "Section.centroid_only",
+}  # fmt: skip
+"""Effects and options of scenes in space; the stored scenes are in the plane."""
+
 
 INDEPENDENT = """
 unit/test_axial_bending_hinge.test_the_plastic_moment_depends_on_the_axial_force:
@@ -154,7 +159,7 @@ PUBLIC = {
     for name, kind in helpers.PUBLIC.items()
     if inspect.isclass(kind)
     and kind.__module__.removeprefix("ufl_beam.").startswith(MODULES)
-    and name not in OTHERS
+    and name not in OTHERS | IN_SPACE
 }
 """Public classes of models, schemes, steps and path controls, by name."""
 
@@ -229,7 +234,9 @@ def options():
         for field in fields(kind) if is_dataclass(kind) else ():
             default = field.default if field.default_factory is MISSING else field.default_factory()
             switch = any(isinstance(x, bool) for x in values_of_fields()[name, field.name])
-            if field.init and field.name not in NAMES and (switch or default is not MISSING):
+            if {field.name, f"{name}.{field.name}"} & (NAMES | IN_SPACE) or not field.init:
+                continue
+            if switch or default is not MISSING:
                 yield name, field.name, default
 
 

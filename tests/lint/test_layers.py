@@ -50,7 +50,7 @@ C_FUNCTION = re.compile(
 )
 """Definition of a function in C: its name, and its body in the same line or in several."""
 
-MOST_DEPTH = 23
+MOST_DEPTH = 24
 """Longest chain of imports at most."""
 
 FINITE_ELEMENTS = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}

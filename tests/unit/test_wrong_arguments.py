@@ -58,7 +58,8 @@ VECTOR = [
     "ab", None, 1.0, (), (1,), (1, 2, 3), (1, "2"), (1, None), (1, NAN), (INF, 0), (1j, 0),
     (HUGE, 0), (ARRAY, ARRAY),
 ]  # fmt: skip
-EITHER = [x for x in VECTOR if x != (1, 2, 3)]
+EITHER = [x for x in VECTOR if not isinstance(x, tuple) or len(x) != 3]
+"""In the place of a vector in the plane or in space."""
 UP = [1.0, "x", (1,), (0, 1), (0, NAN, 1), object()]
 OBJECT = [None, "x", 1.0, (0, 0), ARRAY, object(), int, [BEAM], STEEL]
 """In the place of any object of this package."""
@@ -86,7 +87,7 @@ TIME = [
 ]  # fmt: skip
 CURVE = [
     "x", 1.0, lambda s: None, lambda s: s, lambda s: "ab", lambda s: (s, 1j), lambda s: (s, NAN),
-    lambda s: (s, s, s), lambda s: (s, "0"), lambda: (0, 0), lambda s: 1 / 0,
+    lambda s: (s, "0"), lambda: (0, 0), lambda s: 1 / 0,
 ]  # fmt: skip
 
 
@@ -141,7 +142,8 @@ BY_NAME = {
     **alike(1.0, LIMIT, "eta limit tau"),
     **alike(1.0, optional([*LIMIT, 0.0]), "reloading softening unloading"),
     **alike(2, COUNT, "cells degree every max_iterations max_rows max_states n number steps"),
-    **alike(False, SWITCH, "anew beyond centroid_only lumped multipliers progress reference tangent turning"),
+    **alike(False, SWITCH, "anew beyond centroid_only lumped multipliers progress reference "
+        "tangent turning"),
     **alike((1, 0), EITHER, "acceleration center force linear point"),
     **alike(None, optional(POSITIVE), "GA3 EI2 GJ rhoI2 shear_factor3"),
     "angles": ((1, 0), VECTOR), "up": (None, UP),
@@ -240,7 +242,8 @@ OWN = {
         "omega": ((1.0, 2.0), [*VECTOR, (0.0, 1.0), (1.0, 1.0)])},
     "Rayleigh": {"stiffness": (1.0, FROM_ZERO)},
     # beams, bodies, places
-    "Beam": {"start": ((0, 0), VECTOR), "end": ((1, 0), VECTOR), "curve": (None, CURVE),
+    "Beam": {"start": ((0, 0), VECTOR), "end": ((1, 0), VECTOR),
+        "curve": (None, [*CURVE, lambda s: (s, s, s)]),
         "corners": ((), [None, 1.0, "ab", [None], ["0.5"], [NAN], [1j], [1.5], [ARRAY]])},
     "Beam.polyline": {"points": ([(0, 0), (1, 0)],
         [None, 1.0, "ab", [(0, 0)], [(0, 0), None], [(0, 0), (1, NAN)]])},

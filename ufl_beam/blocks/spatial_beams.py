@@ -85,7 +85,7 @@ class ElasticCellInSpace(StatementInSpace):
 
     @property
     def rates(self) -> int:
-        """Velocities in dynamics."""
+        """Number of rates, which are velocities in dynamics."""
         return int(has_inertia(self.scheme))
 
     @property
@@ -128,7 +128,7 @@ class ElasticCellInSpace(StatementInSpace):
         pair, tangents = turns, [add(transposed_times(axes, FIRST), slope) for slope in slopes]
         if at_end:
             old, tangents, pair = now, [tangents[1]] * 2, [turn.at_end for turn in turns]
-        resultants = [tuple(map(at.stage, transposed_times(axes, x))) for x in (r[:3], r[3:])]
+        resultants = [tuple(map(at.stage, transposed_times(axes, x))) for x in (tuple(r[:3]), tuple(r[3:]))]
         N, *moments = forces_over_step(at.stage, pair, (old, now), tangents, h, resultants)
         on_nodes = [x.on_node(M, at_end=at_end) for x, M in zip(turns, moments, strict=True)]
         if self.rates:
@@ -278,7 +278,7 @@ class TurningBody(StatementInSpace):
 
     @property
     def rates(self) -> int:
-        """Velocities in dynamics."""
+        """Number of rates, which are velocities in dynamics."""
         return int(has_inertia(self.scheme))
 
     @property

@@ -38,7 +38,7 @@ def rotary_inertia(fields: Fields, axes: Array) -> Array:
     """Return the tensors of rotary inertia per length of cells; (n, 3, 3); kg m."""
     third, second = np.nan_to_num(fields.section_values("rhoI", "rhoI2").astype(float)).T
     moments = np.stack([second + third, second, third], axis=1)
-    return np.einsum("nik,nk,njk->nij", axes, moments, axes)
+    return np.asarray(np.einsum("nik,nk,njk->nij", axes, moments, axes))
 
 
 def mass_matrix_in_space(fields: Fields) -> Csr:
@@ -70,7 +70,7 @@ def strains_in_space(fields: Fields, q: Array, turns: Array) -> Array:
     middle = first * Rotation.from_rotvec(between / 2)
     slope = middle.inv().apply((at[b] - at[a]) / lengths[:, None])
     both = (np.einsum("nik,ni->nk", axes, x) for x in (slope, between / lengths[:, None]))
-    return np.hstack([*both]) - np.eye(6)[0]
+    return np.asarray(np.hstack([*both]) - np.eye(6)[0])
 
 
 def momentum_in_space(numbering: DofNumbering, q: Array, p: Array, turns: Array) -> Array:
