@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 EXACT = ub.Newton(rtol=1e-13)
 STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
@@ -223,6 +224,19 @@ def test_section_forces_of_a_cantilever():
     bent = 1e-4 * (3.0 * length**3 / 3 / section.EI + 3.0 * length / section.GA)
     tip = run.displacement(beam.end)[-1]
     assert abs(tip[:3] @ up / bent - 1) < 2e-2  # four cells
+
+
+@pytest.mark.parametrize("force", [1e-6, 1.0, 100.0])
+def test_statics_of_small_loads_converge(force):
+    """A steel tube, four linear cells: the bending part is 1 - 1/(4 n²) of the exact one."""
+    section = st.steel("HSS8X4X1/4", E=200e9, nu=0.3, rho=7850)
+    beam = ub.Beam((0, 0, 0), (3, 0, 0), section, cells=4, up=(0, 1, 0))
+    load = ub.PointLoad(beam.end, force=(0, force, force), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    tip = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False).displacement(beam.end)
+    bending, shear = [section.EI, section.EI2], [section.GA, section.GA3]
+    exact = 9.0 / np.array(bending) * (1 - 1 / (4 * 4**2)) + 3.0 / np.array(shear)
+    assert np.abs(tip[-1, 1:3] / force / exact - 1).max() < 1e-5
 
 
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**STIFF, **OTHER), name="arm")

@@ -128,7 +128,8 @@ class ElasticCellInSpace(StatementInSpace):
         pair, tangents = turns, [add(transposed_times(axes, FIRST), slope) for slope in slopes]
         if at_end:
             old, tangents, pair = now, [tangents[1]] * 2, [turn.at_end for turn in turns]
-        resultants = [tuple(map(at.stage, transposed_times(axes, x))) for x in (tuple(r[:3]), tuple(r[3:]))]
+        both = tuple(r[:3]), tuple(r[3:])
+        resultants = [tuple(map(at.stage, transposed_times(axes, x))) for x in both]
         N, *moments = forces_over_step(at.stage, pair, (old, now), tangents, h, resultants)
         on_nodes = [x.on_node(M, at_end=at_end) for x, M in zip(turns, moments, strict=True)]
         if self.rates:
