@@ -16,37 +16,80 @@ OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
 TURNS = [Rotation.identity(), Rotation.from_rotvec([0.3, -0.7, 1.1])]
 
 
-def frame(section, at, direction, moment):
+def frame(section, at, direction, moment, connectors=lambda *_: []):
     """Two beams with a rigid joint on a pin; vectors of the plane go through ``at``."""
     long = ub.Beam(at(6, 0), at(0, 8), section, cells=10, **direction(1, 1))
     short = ub.Beam(at(0, 8), at(3, 9), section, cells=4, **direction(0, 1))
     push = ub.PointLoad(long.start, force=at(8, 0), moment=moment, amplitude=lambda t: t < 0.5)
     return ub.Scene(
         [long, short], joints=[ub.Rigid(long.end, short.start)],
-        supports=[ub.Pinned(short.end)],
+        supports=[ub.Pinned(short.end)], connectors=connectors(long.start, short.end, at),
         loads=[push, ub.LineLoad(long, force=at(1, -2)), ub.Gravity(at(0.5, -1))],
     )  # fmt: skip
 
 
-def in_plane():
-    return frame(ub.Section(**STIFF), lambda x, y: (x, y), lambda *_: {}, -80.0)
+def in_plane(**more):
+    return frame(ub.Section(**STIFF), lambda x, y: (x, y), lambda *_: {}, -80.0, **more)
 
 
-def in_space(turn):
+def in_space(turn, **more):
     def at(x, y):
         return tuple(turn.apply([x, y, 0.0]))
 
     section, moment = ub.Section(**STIFF, **OTHER), tuple(turn.apply([0.0, 0.0, -80.0]))
-    return frame(section, at, lambda x, y: {"up": at(x, y)}, moment)
+    return frame(section, at, lambda x, y: {"up": at(x, y)}, moment, **more)
 
 
 @pytest.mark.parametrize("turn", TURNS)
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], ids=str)
 def test_a_planar_scene_in_space_has_the_same_motion(scheme, turn):
     """To round-off, also in a turned plane, and nothing moves out of the plane."""
+    same_motion(in_plane(), in_space(turn), scheme, turn)
+
+
+def ground(at, x, y):
+    return ub.ground(*at(x, y))
+
+
+LAWS = {
+    "spring": ub.Spring(40.0), "hardening spring": ub.Spring(300.0, ub.ElastoPlastic(20.0)),
+    "damper": ub.Damper(15.0), "stop": ub.Stop(200.0, low=-0.02, high=0.05),
+    "motor": ub.PrescribedMotion(lambda t: 0.1 * t * t),
+    "force": ub.PrescribedForce(lambda t: 30 * t),
+    "force law": ub.ForceLaw(lambda motion, rate: 20 * motion + 3 * rate),
+}  # fmt: skip
+KINDS = {
+    "Stretch": lambda tip, pin, at, law: ub.Stretch(tip, ground(at, 9, -2), law),
+    "Slide": lambda tip, pin, at, law: ub.Slide(tip, ground(at, 9, -2), law, axis=at(0.6, 0.8)),
+    "Turn": lambda tip, pin, at, law: ub.Turn(
+        ground(at, 3, 9), pin, law, **{} if len(at(0, 0)) == 2 else {"axis": normal(at)}
+    ),
+}
+
+
+def normal(at):
+    return tuple(np.cross(at(1, 0), at(0, 1)))
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_connectors_have_the_same_motion_in_space(kind, law):
+    def add(tip, pin, at):
+        return [KINDS[kind](tip, pin, at, LAWS[law])]
+
+    plane, space = in_plane(connectors=add), in_space(TURNS[1], connectors=add)
+    runs = same_motion(plane, space, ub.EnergyMomentum(), TURNS[1])
+    one, other = (run.connector(run.scene.connectors[0]) for run in runs)
+    for name in ("motion", "force", "work", "dissipated"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert np.abs(a - b).max() < 1e-9 * max(1.0, np.abs(a).max())
+
+
+def same_motion(plane, space, scheme, turn):
+    """Check that displacements and rotations are equal, and return both runs."""
     runs = [
         ub.simulate(x, scheme, t=(0, 1), dt=0.1, newton=EXACT, progress=False)
-        for x in (in_plane(), in_space(turn))
+        for x in (plane, space)
     ]
     plane, space = [run.displacement(run.scene.beams[0].start) for run in runs]
     back = turn.inv()
@@ -56,6 +99,7 @@ def test_a_planar_scene_in_space_has_the_same_motion(scheme, turn):
     assert np.abs(u[:, 2]).max() < 1e-13 * size
     wrapped = Rotation.from_rotvec(plane[:, 2:] * [[0.0, 0.0, 1.0]]).as_rotvec()
     assert np.abs(rotation - wrapped).max() < 1e-12
+    return runs
     for name in ("stored", "kinetic"):
         pair = [run.energy[name] for run in runs]
         assert np.allclose(*pair, rtol=1e-12, atol=1e-12 * runs[0].energy["kinetic"].max())
@@ -226,6 +270,78 @@ def test_section_forces_of_a_cantilever():
     assert abs(tip[:3] @ up / bent - 1) < 2e-2  # four cells
 
 
+def test_velocity_of_a_point_of_a_body():
+    """A ball turns about a constant axis and flies along a line."""
+    ball, spin, speed = ub.Body((1, 2, 3), mass=2.0, inertia=(4, 4, 4)), (1, -2, 2), (3.0, 0, 1)
+    point = ball.at(1, 2.5, 2)
+    start = ub.Velocity([ball], angular=spin, linear=speed, about=(1, 2, 3))
+    scene = ub.Scene(bodies=[ball], initial=[start])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.05, progress=False)
+    arms = run.position(point) - run.position(ball.middle)
+    assert np.abs(run.velocity(point)[:, :3] - speed - np.cross(spin, arms)).max() < 1e-12
+    turned = run.displacement(point)[1:, 3:] / run.times[1:, None]
+    assert np.abs(turned / spin - 1).max() < 0.05**2 * 9 / 12  # Cayley vectors, |spin| = 3
+
+
+def crane():
+    """A spinning wheel on a clamped frame, with a link to the ground."""
+    section = ub.Section(**STIFF, **OTHER)
+    leg = ub.Beam((0, 0, 0), (0, 0, 1.5), section, up=(1, 0, 0), cells=2)
+    arm = ub.Beam((0, 0, 1.5), (1, 0, 1.5), section, cells=3)
+    wheel = ub.Body((1, 0, 1.5), mass=20.0, inertia=(0.4, 0.7, 0.4))
+    spring = ub.Stretch(wheel.at(1.2, 0.1, 1.5), ub.ground(2, 1, 0), ub.Spring(100.0))
+    return ub.Scene(
+        [leg, arm], bodies=[wheel], connectors=[spring],
+        joints=[ub.Rigid(leg.end, arm.start), ub.Revolute(arm.end, wheel.middle, axis=(0, 1, 0))],
+        supports=[ub.Clamped(leg.start)], loads=[ub.Gravity((0, 0, -9.81))],
+        initial=[ub.Velocity([wheel], angular=(0, 30, 0), linear=(0, 0, 0), about=(1, 0, 1.5))],
+    )  # fmt: skip
+
+
+def test_files_have_the_results(tmp_path):
+    """XDMF and VTKHDF have the same numbers, which are those of the solution."""
+    import h5py
+
+    scene, files = crane(), (ub.VTKHDF(tmp_path / "a.hdf"), ub.XDMF(tmp_path / "a.xdmf"))
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=files, progress=False)
+    text = (tmp_path / "a.xdmf").read_text("utf-8")
+    with h5py.File(tmp_path / "a.hdf") as file:
+        points, cells = file["VTKHDF/PointData"], file["VTKHDF/CellData"]
+        last = {name: values[-len(values) // 6 :] for name, values in points.items()}
+        forces = {name: values[-len(values) // 6 :] for name, values in cells.items()}
+        for name, values in last.items():
+            number = repr(values.ravel().tolist()[-1])
+            assert number in text.rpartition(f'Name="{name}"')[2]
+    ends = [arm.end for arm in scene.beams[1:]] + [scene.connectors[0].a]
+    for at, place in zip((6, -2), ends, strict=True):
+        for (moving, turning), values in (
+            (("displacement", "rotation"), run.displacement(place)),
+            (("velocity", "angular velocity"), run.velocity(place)),
+        ):
+            assert (last[moving][at] == values[-1, :3]).all()
+            assert np.abs(last[turning][at] - values[-1, 3:]).max() < 1e-14
+    rows = np.column_stack([forces[name] for name in ("N", "V2", "V3", "T", "M2", "M3")])
+    assert (rows[:5] == np.vstack([run.section_forces(beam) for beam in scene.beams])).all()
+    assert rows[-1, 0] == run.connector(scene.connectors[0]).force[-1] != 0
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize("quantity", ["N", "V", "T", "M"])
+def test_rendered_picture(tmp_path, quantity):
+    from matplotlib.image import imread
+
+    pytest.importorskip("pyvista")
+    run = ub.simulate(crane(), ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, progress=False)
+    camera = ub.Camera(follow=run.scene.beams[1].end, width=4.0)
+    path = tmp_path / "crane.png"
+    ub.render(run, path, quantity=quantity, camera=camera, size=(320, 192))
+    picture = imread(path)[..., :3]
+    colored = np.ptp(picture, axis=2) > 0.2
+    assert 0.005 < colored.mean() < 0.5
+    with pytest.raises(ub.ArgumentError, match="along z, which is upwards"):
+        ub.render(run, path, camera=ub.Camera((0, 0, -1)))
+
+
 @pytest.mark.parametrize("force", [1e-6, 1.0, 100.0])
 def test_statics_of_small_loads_converge(force):
     """A steel tube, four linear cells: the bending part is 1 - 1/(4 n²) of the exact one."""
@@ -300,7 +416,6 @@ def refused():
     control = ub.LoadControl(0.1)
     return {
         "plot": lambda: ub.plot(run),
-        "render": lambda: ub.render(run, "unused.png"),
         "modes": lambda: ub.modes(scene, 1),
         "follow": lambda: ub.follow(scene, control, steps=1),
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),

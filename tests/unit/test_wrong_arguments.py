@@ -306,7 +306,7 @@ OWN = {
     "GeneralizedAlpha": {"rho_inf": (0.8, [*NUMBER, -0.1, 1.1])},
     "EnergyMomentumStatic": {"theta": (1.0, [*NUMBER, 0.4, 1.1])},
     "Camera": {"follow": (BEAM.end, ["x", 1.0, BEAM, ARRAY]),
-        "direction": ((0, 0, -1), [*OBJECT, (0, 1, 0), (0, 0, NAN), ("0", "0", "1")])},
+        "direction": ((0, 0, -1), [*optional(OBJECT), (0, 0, 0), (0, 0, NAN), ("0", "0", "1")])},
     "Mesh": {"refine": (1, [*POSITIVE, 1.5]), "degree": (1, [*COUNT, 4])},
     "Newton": {"petsc": ({}, [None, 1.0, "x", [], {1: None}])},
     "Adaptive": {"stops": ((), [None, 1.0, "ab", [None], ["1"], [NAN], [1j], [HUGE]])},

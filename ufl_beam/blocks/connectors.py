@@ -297,8 +297,9 @@ class Damped(OnConnector):
 
 def geometry_of(c: Connector) -> list[float]:
     """Return the numbers of a :class:`Geometry`, or of a :class:`GeometryInSpace`."""
-    found = [*c.arms[0], *c.arms[1], *c.apart, *c.axis]
-    return [*found, *(c.other or [0.0] * 3)] if len(c.apart) == 3 else found
+    d = len(c.apart)
+    found = [*c.arms[0], *c.arms[1], *c.apart, *(*c.axis, 0.0)[:d]]
+    return [*found, *(c.other or [0.0] * 3)] if d == 3 else found
 
 
 class ConnectorBlock(Block):

@@ -99,6 +99,11 @@ def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) ->
     return a * Rotation.from_rotvec(weights[1] * (a.inv() * b).as_rotvec())
 
 
+def rotation_vectors(turns: Array) -> Array:
+    """Return rotation vectors, of angles up to π; (n, 3); rad."""
+    return np.asarray(_rotations(turns).as_rotvec())
+
+
 def _rotations(turns: Array) -> Rotation:
     return Rotation.from_quat(np.roll(turns + np.eye(4)[0], -1, axis=1))
 

@@ -331,7 +331,7 @@ def stream_keys(segments: Iterable[tuple[Point, Point]]) -> list[tuple[int, int]
     seen: Counter[int] = Counter()
     keys = []
     for a, b in segments:
-        checksum = crc32(struct.pack("4d", *a, *b))
+        checksum = crc32(struct.pack(f"{2 * len(a)}d", *a, *b))
         keys.append((checksum, seen[checksum]))
         seen[checksum] += 1
     return keys

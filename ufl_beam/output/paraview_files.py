@@ -44,7 +44,6 @@ class TimeSeries(FileRecorder):
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write mesh and initial state, or delete the steps that follow a :meth:`state`."""
-        simulation.scene.require_plane(type(self).__name__)
         self._scene = LineData(simulation)
         if (points := len(self._scene.points)) > self.limit:
             raise ArgumentError(
@@ -73,9 +72,10 @@ class XDMF(TimeSeries):
 
     Points have ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
     ``velocity`` (m/s) and ``angular velocity`` (rad/s).  Cells have ``N``, ``V`` (N), ``M`` (N m)
-    in their middle; if something may yield or break, also the ``jump`` of the hinge (rad), the
-    ``dissipated energy`` (J), and the internal variables of laws, such as ``state.plastic``, with
-    their values of the largest magnitude in a cell.  ``part`` is 0 in beams; 1 in lines from the
+    in their middle, in space ``N``, ``V2``, ``V3``, ``T``, ``M2``, ``M3``; if something may yield
+    or break, also the ``jump`` of the hinge (rad), the ``dissipated energy`` (J), and the internal
+    variables of laws, such as ``state.plastic``, with their values of the largest magnitude in a
+    cell.  ``part`` is 0 in beams; 1 in lines from the
     centre of each body to its points; 2 along links and connectors, where N is a force along the
     line.
 

@@ -104,7 +104,8 @@ class PresentState(ABC):
             ArgumentError: The joint shares unknowns, or joint or support is not in the scene.
         """
         if isinstance(joint, Support):
-            return float(np.linalg.norm(self.now.reaction(joint)[0, :2]))
+            force = self.now.reaction(joint)[0, : self.numbering.displacements]
+            return float(np.linalg.norm(force))
         connectors = self.scene.all_connectors
         values = [n for n in connector_indices(self.scene, joint) if not connectors[n].is_rotation]
         return float(np.linalg.norm(self.connections()[values, FORCE]))
@@ -118,11 +119,11 @@ class PresentState(ABC):
         return in_beam(self.numbering, self.internal(), beam)
 
     def section_forces(self) -> Array:
-        """Return (N, V, M) in the middle of all cells in the last step; (num_cells, 3); N, N, N m.
+        """Return the section forces of all cells in the last step; (num_cells, 3 or 6); N, N m.
 
-        They are computed as in :meth:`Solution.diagram`.
+        They are computed as in :meth:`Solution.section_forces`.
         """
-        return np.asarray(self.now.cell_forces(0)[:, 0])
+        return self.now.forces_in_middle(0)
 
 
 class StateView(PresentState):

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import turned
-from ufl_beam.model.bodies import AttachmentPoint, arm
+from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.internal_variables import in_cells
@@ -21,6 +20,10 @@ LineFields = tuple[Mapping[str, Array], Mapping[str, Array]]
 
 
 BODY, CONNECTOR = 1, 2  # kinds of lines: bodies, and links or connectors
+
+
+RESULTANTS_IN_SPACE = "N", "V2", "V3", "T", "M2", "M3"
+"""Forces along the axes 1, 2, 3 of a section, and moments about them; N, N m."""
 
 
 class Rod(NamedTuple):
@@ -36,9 +39,9 @@ def scene_rods(scene: Scene) -> list[Rod]:
     """Return lines from the centre of a body to its points, and along links and connectors."""
     spots, rods = attachment_points(scene), list[Rod]()
     for body in scene.bodies:
-        x, y = body.center
         # A body with attachments at its centre alone also gets a line, which shows its rotation.
-        beside = body.at(x + 0.02 * scene.size, y)
+        x, *others = body.center
+        beside = body.at(x + 0.02 * scene.size, *others)
         others = [s for s in spots[body] if s.point != body.center] or [beside]
         rods += [Rod(body.middle, place, BODY) for place in others]
     for joint in scene.joints:
@@ -49,7 +52,7 @@ def scene_rods(scene: Scene) -> list[Rod]:
     rods += [
         Rod(c.a, c.b, CONNECTOR, c if c.stretches else None)
         for c in scene.connectors
-        if not c.is_rotation and c.apart != (0.0, 0.0)
+        if not c.is_rotation and any(c.apart)
     ]
     return rods
 
@@ -58,7 +61,7 @@ class LineData:
     """Geometry of beams, bodies and connectors as lines, and the fields of a state on these lines.
 
     Points and lines of beams come first.  Each line of a body or connector follows, with two points
-    of its own.  There N is the force of a connector along its line, else 0; V and M are zero.
+    of its own.  There N is the force of a connector along its line; other section forces are zero.
 
     Attributes:
         points: Coordinates of points; (n, 3); m.
@@ -68,16 +71,12 @@ class LineData:
 
     def __init__(self, simulation: StateView) -> None:
         numbering, rods = simulation.numbering, scene_rods(simulation.scene)
-        ends = [end for rod in rods for end in (rod.a, rod.b)]
-        corners = np.reshape([end.point for end in ends], (-1, 2))
-        own = len(numbering.points) + np.arange(len(ends)).reshape(-1, 2)
-        points = np.concatenate([numbering.points, corners])
-        self.points: Array = np.insert(points, 2, 0.0, axis=1)
+        self._ends = [end for rod in rods for end in (rod.a, rod.b)]
+        own = len(numbering.points) + np.arange(len(self._ends)).reshape(-1, 2)
+        points = np.array([*numbering.points, *(end.point for end in self._ends)])
+        self.points: Array = _in_three(points)
         self.cells: Index = np.concatenate([numbering.pieces, own])
         self.kinds = np.append(np.zeros(len(numbering.pieces)), [rod.group for rod in rods])
-        self._nodes = np.concatenate([numbering.dofs, *(numbering.node(a)[None] for a in ends)])
-        self._ends = slice(len(numbering.points), None)
-        self._arms = np.reshape([arm(end) for end in ends], (-1, 2))
         connectors = simulation.scene.all_connectors
         # Connectors whose forces act along lines, by the index of the line in ``rods``
         self._pulls = {k: connectors.index(rod.along) for k, rod in enumerate(rods) if rod.along}
@@ -85,18 +84,18 @@ class LineData:
 
     def fields(self, simulation: StateView) -> LineFields:
         """Compute the fields of the present state, see :class:`XDMF`, on all processes together."""
-        q = simulation.subdomain.gather(simulation.q)[self._nodes]
-        arms = turned(self._arms, q[self._ends, 2])
-        displacement = np.insert(q[:, :2], 2, 0.0, axis=1)
-        displacement[self._ends, :2] += arms - self._arms
-        at_points = {"displacement": displacement, "rotation": q[:, 2]}
-        for velocities in simulation.velocities():
-            v = simulation.subdomain.gather(velocities)[self._nodes]
-            velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
-            velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
-            at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
+        now, at_points, d = simulation.now, dict[str, Array](), simulation.numbering.displacements
+        motions = [("rotation", "displacement", now.motion_of_nodes(0), now.displacement)]
+        if len(v := now.v):
+            of_nodes = v[0, simulation.numbering.dofs]
+            motions.append(("angular velocity", "velocity", of_nodes, now.velocity))
+        for turning, moving, of_nodes, of_place in motions:
+            values = np.array([*of_nodes, *(of_place(end)[0] for end in self._ends)])
+            at_points[moving] = _in_three(values[:, :d])
+            at_points[turning] = values[:, 2] if d == 2 else values[:, d:]
         forces = simulation.section_forces()
-        fields: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        names = "NVM" if d == 2 else RESULTANTS_IN_SPACE
+        fields: dict[str, Array] = dict(zip(names, forces.T, strict=True))
         if simulation.may_break:
             fields["jump"], fields["dissipated energy"] = simulation.damage()
             variables = in_cells(simulation.numbering, simulation.internal())
@@ -109,3 +108,9 @@ class LineData:
             rods = of_lines["N"][len(self.cells) - self._num_rods :]
             rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
         return at_points, of_lines
+
+
+def _in_three(vectors: Array) -> Array:
+    """Return vectors of the plane with a third component 0, and those in space as they are."""
+    flat = np.zeros((len(vectors), 3 - vectors.shape[1]))
+    return np.hstack([vectors, flat])

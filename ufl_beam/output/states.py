@@ -18,6 +18,7 @@ from ufl_beam.discretization.cells_in_space import (
     STIFFNESS_IN_SPACE,
     TURNS,
     momentum_in_space,
+    rotation_vectors,
     strains_in_space,
     turns_at,
 )
@@ -305,15 +306,29 @@ class States:
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
 
+    def motion_of_nodes(self, n: int) -> Array:
+        """Return :meth:`displacement` of all nodes of beams in a state; (num_nodes, 3 or 6)."""
+        motion = np.asarray(self._row("q", n)[self.numbering.dofs])
+        if self.scene.in_space:
+            motion[:, 3:] = rotation_vectors(self._row(TURNS, n)[: len(motion)])
+        return motion
+
     def velocity(self, place: AttachmentPoint) -> Array:
         """Return the velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
+
+        In space, return the velocity, and the angular velocity about axes of the node; (n+1, 6).
 
         Raises:
             ArgumentError: The run was static, or the beam or body is not in the scene.
         """
         if not len(v := self.column("v")):
             raise ArgumentError("velocity: the run was static; there is none")
-        return velocity_at(self.numbering, place, self.column("q"), v)
+        if not self.scene.in_space:
+            return velocity_at(self.numbering, place, self.column("q"), v)
+        motion = values_at(self.numbering, place, v)
+        turns = turns_at(self.numbering, place, self.column(TURNS))
+        motion[:, :3] += turns.apply(np.cross(motion[:, 3:], arm(place)))
+        return motion
 
     def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""
@@ -463,11 +478,14 @@ class States:
         In space, return the forces along, and moments about, the axes 1, 2 and 3 of the sections,
         of the strains of the state; (num_cells, 6).
         """
-        if self.scene.in_space:
-            stiffness = self.cells.fields.section_values(*STIFFNESS_IN_SPACE)
-            forces = stiffness * self.mean_strains(n)
-            return np.asarray(forces[self.numbering.cells_of(beam)])
-        return np.asarray(self.cell_forces(n)[self.numbering.cells_of(beam), 0])
+        return self.forces_in_middle(n)[self.numbering.cells_of(beam)]
+
+    def forces_in_middle(self, n: int) -> Array:
+        """Return :meth:`section_forces` of all cells; (num_cells, 3 or 6)."""
+        if not self.scene.in_space:
+            return np.asarray(self.cell_forces(n)[:, 0])
+        stiffness = self.cells.fields.section_values(*STIFFNESS_IN_SPACE)
+        return np.asarray(stiffness * self.mean_strains(n))
 
     def section_forces_at(self, place: Place) -> Array:
         """Return (N, V, M) of :meth:`diagram` at a place; (n+1, 3); N, N, N m.

@@ -105,7 +105,7 @@ class Canvas:
         self.magnify, self.unit, self.outside, self.scale = magnify, unit, outside or unit, scale
         self._solution = subject if isinstance(subject, States) else None
         self.scene = subject.scene if isinstance(subject, States) else subject
-        self._shown = shown
+        self.shown = shown
         self.spots = attachment_points(self.scene)  # attachment points of bodies and of the ground
 
     @classmethod
@@ -137,7 +137,8 @@ class Canvas:
         require_kind(n, (int, np.integer), "plot: n")
         numbering, n = self._solution.numbering, self._solution.index(n)
         state = self._solution.subset(n, n + 1)
-        nodes = numbering.points + self.magnify * state.q[0, numbering.dofs[:, :2]]
+        moved = state.q[0, numbering.dofs[:, : numbering.displacements]]
+        nodes = numbering.points + self.magnify * moved
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 
     def points(self, origin: AttachmentPoint | None = None) -> Array:
@@ -148,7 +149,7 @@ class Canvas:
         """
         ground = np.reshape([point.point for point in self.spots[GROUND]], (-1, 2))
         shapes = []
-        for shape in (self.undeformed, *map(self.shape, self._shown)):
+        for shape in (self.undeformed, *map(self.shape, self.shown)):
             bodies = [shape.body_points(body, outline) for body, outline in self.outlines.items()]
             points = np.concatenate([shape.nodes, ground, *bodies])
             shapes.append(points if origin is None else points - shape.at(origin))
@@ -163,7 +164,7 @@ class Canvas:
         units at ends where the curve goes on.
         """
         ranges: dict[Connector, Range] = {}
-        solution, shown = self._solution, list(self._shown)
+        solution, shown = self._solution, list(self.shown)
         for holder in (holder for joint in self.scene.joints for holder in joint.holders):
             if isinstance(holder.law, Guide):
                 ranges[holder] = self._along_guide(holder, holder.law)
@@ -183,7 +184,7 @@ class Canvas:
         curve, size, parameters = law.curve, self.scene.size, [0.0]
         for point in () if self._solution is None else self._solution.position(holder.b):
             parameters.append(curve.nearest(point, parameters[-1], size))
-        used = [0.0, *(parameters[1:][n] for n in self._shown)]
+        used = [0.0, *(parameters[1:][n] for n in self.shown)]
         ends = []
         for s, more in ((np.nanmin(used), -3.0), (np.nanmax(used), 3.0)):
             beyond = float(s + more * self.unit / math.hypot(*curve.at(float(s))[1]))
@@ -230,12 +231,13 @@ class DeformedShape:
     """Drawn positions of a scene at one time."""
 
     canvas: Canvas
-    motion: Callable[[AttachmentPoint], Array]  # (u, v, ψ) of a place, not magnified; m, m, rad
-    nodes: Array  # of all beams of a solution; (num_nodes, 2); m
+    motion: Callable[[AttachmentPoint], Array]  # displacement of a place, not magnified; m, rad
+    nodes: Array  # of all beams of a solution; (num_nodes, 2 or 3); m
 
     def at(self, place: AttachmentPoint) -> Array:
-        """Return the coordinates of a place; (2,); m."""
-        return np.asarray(place.point + self.canvas.magnify * self.motion(place)[:2])
+        """Return the coordinates of a place; (2,) or (3,); m."""
+        moved = self.motion(place)[: len(place.point)]
+        return np.asarray(place.point + self.canvas.magnify * moved)
 
     def rotation(self, place: AttachmentPoint) -> float:
         """Return the rotation of a place; rad."""

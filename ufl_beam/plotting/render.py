@@ -31,26 +31,35 @@ from ufl_beam.plotting.positions import (
     normal,
     unit_vectors,
 )
+from ufl_beam.plotting.solids_in_space import (
+    FROM_A_SIDE,
+    PIN,
+    UP_IN_SPACE,
+    beams_in_space,
+    others_in_space,
+    points_in_space,
+    values_in_space,
+)
+from ufl_beam.plotting.solids_in_space import RESULTANTS as IN_SPACE
 from ufl_beam.plotting.style import RESULTANTS
 from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin, disc
 from ufl_beam.simulation.solution import Solution
 
 QUANTITIES = {name: (f"{words} {name}", unit) for name, (words, unit) in RESULTANTS.items()}
 QUANTITIES["rotation"] = "rotation", "rad"
-PIN = "#707070"  # colour of joints
-
+QUANTITIES_IN_SPACE = {name: (f"{words} {name}", unit) for name, (words, unit) in IN_SPACE.items()}
 UP = np.array([0.0, 1.0, 0.0])  # upwards in the picture; the scene is in the plane of x and y
+FROM_THE_FRONT = (-0.20, -0.28, -1.0)  # view direction
 
 Direction = tuple[float, float, float]
 
 
-def _require_direction(value: Any, what: str) -> Direction:
+def _require_direction(value: Any, what: str) -> Direction | None:
+    if value is None:
+        return None
     direction = require_row(value, what)
-    if direction.shape != (3,) or not np.cross(direction, UP).any():
-        raise ArgumentError(
-            f"{what} = {value} must be three numbers (x, y, z), and not along y, which is upwards "
-            "in the picture; (0, 0, -1) is the front view"
-        )
+    if direction.shape != (3,) or not direction.any():
+        raise ArgumentError(f"{what} = {value} must be three numbers (x, y, z), not all zero")
     x, y, z = map(float, direction)
     return x, y, z
 
@@ -62,14 +71,15 @@ class Camera(Record):
     By default it is fixed and shows the whole motion.
 
     Attributes:
-        direction: View direction; (x, y, z).  The scene is in the plane of x and y; y is upwards
-            in the picture, and (0, 0, -1) is the front view.
+        direction: View direction; (x, y, z).  For a scene in the plane of x and y, y is upwards in
+            the picture, and (0, 0, -1) is the front view.  For a scene in space, z is upwards.
         follow: Place that the camera moves with, so that the place is at rest in the picture.
         width: Width of the picture around the followed place, or around the middle of the motion;
             m.  By default it contains the whole motion.
 
     Raises:
-        ArgumentError: A direction along y, or a wrong argument; the message says which.
+        ArgumentError: A wrong argument; the message says which.  A picture refuses a direction
+            along the axis that is upwards.
 
     Example:
         >>> front = ub.Camera((0, 0, -1))
@@ -79,9 +89,20 @@ class Camera(Record):
 
     _refused = ArgumentError
 
-    direction: Annotated[Direction, _require_direction] = (-0.20, -0.28, -1.0)
+    direction: Annotated[Direction | None, _require_direction] = None
     follow: Annotated[AttachmentPoint | None, require_place] = None
     width: Annotated[float | None, partial(require_number, positive=True)] = None
+
+    def axes(self, in_space: bool) -> tuple[Array, Array]:
+        """Return the view direction, of length 1, and the direction that is upwards; (3,)."""
+        default, up = (FROM_A_SIDE, UP_IN_SPACE) if in_space else (FROM_THE_FRONT, UP)
+        direction = np.array(self.direction or default)
+        if not np.cross(direction, up).any():
+            raise ArgumentError(
+                f"Camera: direction = {self.direction} is along {'yz'[in_space]}, which is upwards "
+                "in the picture"
+            )
+        return direction / np.linalg.norm(direction), up
 
     def aim(self, plotter: Any, box: Array, shape: DeformedShape, size: tuple[int, int]) -> None:
         """Fit a box between the colour bar and the line with the time, or show ``width``.
@@ -92,9 +113,11 @@ class Camera(Record):
             shape: Shape of the scene with the followed place.
             size: Width and height of the picture; pixels.
         """
-        origin = np.zeros(2) if self.follow is None else shape.at(self.follow)
-        towards = np.array(self.direction) / np.linalg.norm(self.direction)
-        right = np.cross(towards, UP)
+        origin = np.zeros(3)
+        if self.follow is not None:
+            origin[: len(self.follow.point)] = shape.at(self.follow)
+        towards, upwards = self.axes(shape.canvas.scene.in_space)
+        right = np.cross(towards, upwards)
         right /= np.linalg.norm(right)
         up = np.cross(right, towards)
         middle, aspect = box.mean(axis=0), size[1] / size[0]
@@ -105,7 +128,7 @@ class Camera(Record):
         else:
             scale = self.width * aspect / 2
             middle = middle if self.follow is None else np.zeros(3)
-        focus = np.append(origin, 0.0) + middle - 0.08 * scale * up
+        focus = origin + middle - 0.08 * scale * up
         plotter.camera.parallel_projection = True
         plotter.camera.parallel_scale = scale
         plotter.camera.focal_point = focus
@@ -138,7 +161,8 @@ def render(
         solution: Solution to draw.
         path: File, ending in ``.png``.
         n: Index of the recorded time; negative from the end.
-        quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
+        quantity: Quantity that colours the beams: "N", "V", "M" or "rotation"; in space "N", "V",
+            "T" or "M", where V and M are magnitudes.
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
         camera: View direction, and the place that the camera follows.
@@ -184,7 +208,8 @@ def animate(
         path: File ending in ``.gif``, or in ``.mp4``, which needs ffmpeg (imageio-ffmpeg).
         fps: Frames per second; browsers show at most 50 frames per second of a GIF.
         seconds: Duration of the film, independent of the duration of the motion; s.
-        quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
+        quantity: Quantity that colours the beams: "N", "V", "M" or "rotation"; in space "N", "V",
+            "T" or "M", where V and M are magnitudes.
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
         camera: View direction, and the place that the camera follows.
@@ -229,15 +254,13 @@ def _frames(solids: Solids) -> Generator[Any, None, None]:
     numbering, beams = solution.numbering, solution.scene.beams
     largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(solids.shown))
     factor, prefix = style.decimal_prefix(largest)
-    limit, (words, unit) = largest / factor or 1.0, QUANTITIES[solids.quantity]
+    limit, (words, unit) = largest / factor or 1.0, solids.quantities[solids.quantity]
     text = {"font_size": size[1] // 40, "color": "black", "viewport": True}
     bar = {
         "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
         "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": size[1] // 36,
     }  # fmt: skip
-    xy = canvas.points(solids.camera.follow)
-    margin, half = 2.2 * canvas.unit, solids.thickest(beams)[1] / 2
-    box = np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
+    box = solids.box()
     with screen(pyvista):
         plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
         try:
@@ -302,15 +325,38 @@ class Solids:
     size: tuple[int, int]
 
     def __post_init__(self) -> None:
-        self.solution.scene.require_plane("render and animate")
-        style.require_option(self.quantity, QUANTITIES, "quantity")
+        style.require_option(self.quantity, self.quantities, "quantity")
         require_number(self.thickness, "thickness", positive=True)
         require_kind(self.camera, Camera, "camera")
         for pixels in self.size:
             require_number(pixels, "size", at_least=16)
+        self.camera.axes(self.in_space)  # raises if the camera looks along the vertical
         shape = self.canvas.shape(self.shown[0])  # raises if ``magnify`` or the time is wrong
         if self.camera.follow is not None:
             shape.at(self.camera.follow)  # raises if the place is not in the scene
+
+    @property
+    def in_space(self) -> bool:
+        """True if the scene is in space."""
+        return self.solution.scene.in_space
+
+    @property
+    def quantities(self) -> dict[str, tuple[str, str]]:
+        """Names and units of the quantities that colours can show."""
+        return QUANTITIES_IN_SPACE if self.in_space else QUANTITIES
+
+    def box(self) -> Array:
+        """Return the lower and upper corner of the whole motion, beside the followed place; m."""
+        canvas, follow = self.canvas, self.camera.follow
+        if self.in_space:
+            shapes = [canvas.undeformed, *map(canvas.shape, canvas.shown)]
+            origins = [np.zeros(3) if follow is None else shape.at(follow) for shape in shapes]
+            pairs = zip(map(points_in_space, shapes), origins, strict=True)
+            points, half = np.concatenate([x - at for x, at in pairs]), 2.2 * canvas.unit
+            return np.array([points.min(axis=0) - half, points.max(axis=0) + half])
+        xy = canvas.points(follow)
+        margin, half = 2.2 * canvas.unit, self.thickest(self.solution.scene.beams)[1] / 2
+        return np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
 
     @cached_property
     def canvas(self) -> Canvas:
@@ -334,6 +380,8 @@ class Solids:
     def values(self, n: int) -> Array:
         """Return the values that colours show at both ends of all cells; (num_cells, 2)."""
         solution, numbering = self.solution, self.solution.numbering
+        if self.in_space:
+            return values_in_space(solution, self.quantity, n)
         if self.quantity == "rotation":
             return np.asarray(solution.q[n][numbering.dofs[numbering.cells, 2]])
         diagrams = (solution.diagram(beam, n, points=2) for beam in solution.scene.beams)
@@ -347,6 +395,10 @@ class Solids:
         """
         from pyvista import CellType, UnstructuredGrid
 
+        if self.in_space:
+            mesh = beams_in_space(self.solution, n, shape, self.thickness)
+            mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
+            return mesh
         numbering = self.solution.numbering
         vertices = np.arange(numbering.cells.max(initial=-1) + 1)
         along = unit_vectors(np.diff(numbering.points[numbering.cells], axis=1)[:, 0])
@@ -376,6 +428,8 @@ class Solids:
 
         Filled areas are blocks, and lines are rods.
         """
+        if self.in_space:
+            return others_in_space(shape)
         scene, unit = self.solution.scene, shape.canvas.unit
         body, front = self.thickest(())[1], 0.7 * self.thickest(scene.beams)[1]
         blocks: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
