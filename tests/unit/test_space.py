@@ -85,13 +85,54 @@ def test_connectors_have_the_same_motion_in_space(kind, law):
         assert np.abs(a - b).max() < 1e-9 * max(1.0, np.abs(a).max())
 
 
-def same_motion(plane, space, scheme, turn):
+def with_ball(at, joint, *, in_plane, moving):
+    """A beam with a ball: clamped in statics, else on a pin about which both turn at first."""
+    section = ub.Section(**STIFF, **{} if in_plane else OTHER)
+    beam = ub.Beam(at(0, 0), at(2, 0), section, cells=4, **{} if in_plane else {"up": at(0, 1)})
+    ball = ub.Body(at(2.5, 0.3), mass=3.0, inertia=0.7 if in_plane else (0.7, 0.7, 0.7))
+    spin = 0.5 if in_plane else tuple(0.5 * np.array(normal(at)))
+    start = [ub.Velocity([beam, ball], angular=spin, about=at(0, 0))] * moving
+    joints = [joint(beam, ball, at, {} if in_plane else {"axis": normal(at)})]
+    loads = [ub.Gravity(at(2, -9), amplitude=lambda t: min(1.0, 0.5 + t))]
+    foot = (ub.Pinned if moving else ub.Clamped)(beam.start)
+    parts = {"bodies": [ball], "joints": joints, "supports": [foot]}
+    return ub.Scene([beam], **parts, loads=loads, initial=start)
+
+
+JOINTS = {
+    "rigid": lambda beam, ball, at, axis: ub.Rigid(beam.end, ball.at(*at(2, 0))),
+    "rigid link": lambda beam, ball, at, axis: ub.RigidLink(beam.at(0.5), ball.middle),
+    "revolute": lambda beam, ball, at, axis: ub.Revolute(beam.end, ball.at(*at(2, 0)), **axis),
+    "prismatic": lambda beam, ball, at, axis: ub.Prismatic(
+        beam.end, ball.at(*at(2, 0)), axis=at(0.6, 0.8)
+    ),
+    "link": lambda beam, ball, at, axis: ub.Link(beam.at(0.5), ball.middle),
+}
+BOTH = [(joint, ub.EnergyMomentum()) for joint in JOINTS] + [
+    (joint, scheme)
+    for joint in ("rigid", "rigid link")
+    for scheme in (ub.Static(), ub.EnergyMomentumStatic())
+]
+
+
+@pytest.mark.parametrize(("joint", "scheme"), BOTH, ids=str)
+def test_joints_have_the_same_motion_in_space(joint, scheme):
+    turn, both = TURNS[1], []
+    for in_plane in (True, False):
+        at = (lambda x, y: (x, y)) if in_plane else (lambda x, y: tuple(turn.apply([x, y, 0.0])))
+        moving = isinstance(scheme, ub.EnergyMomentum)
+        both.append(with_ball(at, JOINTS[joint], in_plane=in_plane, moving=moving))
+    for place in (lambda scene: scene.beams[0].end, lambda scene: scene.bodies[0].middle):
+        same_motion(*both, scheme, turn, place)
+
+
+def same_motion(plane, space, scheme, turn, place=lambda scene: scene.beams[0].start):
     """Check that displacements and rotations are equal, and return both runs."""
     runs = [
         ub.simulate(x, scheme, t=(0, 1), dt=0.1, newton=EXACT, progress=False)
         for x in (plane, space)
     ]
-    plane, space = [run.displacement(run.scene.beams[0].start) for run in runs]
+    plane, space = [run.displacement(place(run.scene)) for run in runs]
     back = turn.inv()
     u, rotation = back.apply(space[:, :3]), back.apply(space[:, 3:])
     size = runs[0].scene.size
@@ -357,6 +398,7 @@ def test_statics_of_small_loads_converge(force):
 
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**STIFF, **OTHER), name="arm")
 PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
+BALL = ub.Body((0, 0, 0), mass=1.0, inertia=(1, 1, 1), name="ball")
 WRONG = {
     "mixed points": (lambda: ub.Scene([BEAM, PLANAR]), "two coordinates"),
     "mixed ends": (lambda: ub.Beam((0, 0), (1, 0, 0), BEAM.section), "must both have"),
@@ -378,6 +420,16 @@ WRONG = {
     "vector as a moment": (
         lambda: ub.Scene([PLANAR], loads=[ub.PointLoad(PLANAR.end, moment=(0, 0, 1))]),
         "must have 1 components",
+    ),
+    "load at an arm": (
+        lambda: ub.Scene(
+            bodies=[BALL], loads=[ub.PointLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
+        ), "act at their centres",
+    ),
+    "friction": (
+        lambda: ub.Scene([BEAM], connectors=[
+            ub.Slide(ub.ground(1, 0, 0), BEAM.end, ub.Coulomb(1.0), axis=(0, 1, 0))
+        ]), "Coulomb is a law for scenes in the plane",
     ),
     "planar support": (
         lambda: ub.Scene([BEAM], supports=[ub.Roller(BEAM.end)]), "Roller is for scenes",
@@ -416,6 +468,7 @@ def refused():
     control = ub.LoadControl(0.1)
     return {
         "plot": lambda: ub.plot(run),
+        "buckling": lambda: ub.buckling(scene, 1),
         "modes": lambda: ub.modes(scene, 1),
         "follow": lambda: ub.follow(scene, control, steps=1),
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),

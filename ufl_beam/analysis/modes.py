@@ -414,6 +414,7 @@ def buckling(
         1.00
     """
     require_kind(scene, Scene, "buckling: scene")
+    scene.require_plane("buckling")
     n = require_count(n, "buckling: n")
     at = require_state("buckling", scene, at, mesh)
     require_number(t, "buckling: t")

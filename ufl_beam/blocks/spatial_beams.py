@@ -289,7 +289,8 @@ class TurningBody(StatementInSpace):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
-        m, none = change(at, "abc", 0), [ufl.as_ufl(0.0)] * 3
+        m = change(at, "abc", 0)
+        none = [m[0] - m[0]] * 3  # UFL would drop forces that are all zero
         state = new_state([Turn(at.stage, m, quaternion(at, 0))])
         if not self.rates:
             return Equations([*none, *none], state)

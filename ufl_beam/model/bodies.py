@@ -413,7 +413,8 @@ class Velocity(Record):
         """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s; in space six rates."""
         if z:
             arm = np.array([x, y, *z]) - (self.about or (0.0, 0.0, 0.0))
-            return *(np.array(self.linear) + np.cross(self.angular, arm)), *self.angular
+            spin = np.broadcast_to(self.angular, 3)  # it may be the default of the plane
+            return *((*self.linear, 0.0)[:3] + np.cross(spin, arm)), *spin
         about_x, about_y = self.about or (0.0, 0.0)
         return (
             self.linear[0] - self.angular * (y - about_y),

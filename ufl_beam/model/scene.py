@@ -27,10 +27,11 @@ from ufl_beam.model.bodies import (
     Representatives,
     Velocity,
     merged,
+    moves_with_node,
     node,
 )
 from ufl_beam.model.checks import require_all
-from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic
+from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic, has_friction
 from ufl_beam.model.connectors import (
     Component,
     Connector,
@@ -412,6 +413,16 @@ def require_space(scene: Scene) -> None:
             raise ModelError(
                 f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in "
                 f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
+            )
+        law = getattr(record, "law", None)
+        if has_friction(law) or isinstance(law, RigidPlastic):
+            raise ModelError(
+                f"{record._label()}: {type(law).__name__} is a law for scenes in the plane"
+            )
+        if isinstance(record, PointLoad) and not moves_with_node(record.place):
+            raise ModelError(
+                f"{record._label()}: in space loads of bodies act at their centres; for a load at "
+                "an arm, join a short stiff beam to the body and load its end"
             )
     for beam in scene.beams:
         section = beam.section

@@ -249,7 +249,7 @@ class Stepper(StateView):
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
             largest_turn=LARGEST_ROTATION if scheme.limits_rotation or in_motion else math.inf,
             turns_from_velocities=in_motion and not scheme.limits_rotation,
-            rotations=len(rotations), rotation=rotations,
+            rotations=len(rotations), rotation=rotations, axes=3 if self.scene.in_space else 1,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
             loads=len(loads), load=ffi.new("vector *[]", loads),

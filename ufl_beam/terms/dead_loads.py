@@ -151,7 +151,8 @@ def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Ind
     # In space, moments at places are statements, and there are none along beams
     moment = [0.0] * 3 if numbering.scene.in_space else [getattr(load, "moment", 0.0)]
     if isinstance(load, PointLoad):
-        at_places = [(load.place, (*load.force, *moment))]
+        force = (*load.force, 0.0)[: numbering.displacements]
+        at_places = [(load.place, (*force, *moment))]
     elif isinstance(load, LineLoad):
         loaded, factors = loaded_cells(load, subdomain)
         shares, density = factors @ mesh.gauss[1], [*load.force, *moment]

@@ -265,10 +265,16 @@ static int measure(time_loop *m)
     turn_axes(e->turned, e->axes, m->x, -1);
   }
   for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
-  for (int k = 0; k < m->rotations; ++k) {
-    const int i = m->rotation[k];
-    turn = fmax(turn, fabs(v ? m->s[i] - m->step.dt * v[i] : m->s[i]));
+  for (int k = 0; k < m->rotations; k += m->axes) {
+    double square = 0; /* of a vector in space */
+    for (int j = 0; j < m->axes; ++j) {
+      const int i = m->rotation[k + j];
+      const double x = v ? m->s[i] - m->step.dt * v[i] : m->s[i];
+      square += x * x;
+    }
+    turn = fmax(turn, square);
   }
+  turn = sqrt(turn);
   m->turn = over_processes(e, LARGEST, turn);
   if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
     return fails(m, APPLIED_TOO_FAST);
