@@ -204,9 +204,9 @@ class _Frame:
         self.comm, self.subdomain = subdomain.comm, subdomain
         self.q, self.t = shapes.q + change, t
         self._shapes, self._strains, self._change = shapes, strains, change
-
-    def velocities(self) -> list[Array]:
-        return []
+        self.now = Solution(self.scene, self.numbering)
+        history = {"t": np.array([t]), "q": self.q[None], "every": np.array([1])}
+        self.now.resume(history | {FORCES: shapes.resultants[None]})
 
     def connections(self) -> Array:
         return np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
