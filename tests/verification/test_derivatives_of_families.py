@@ -156,7 +156,6 @@ FAMILIES = {
     ),
     "flying beam, order 4": (flying, ub.EnergyMomentum(order=4), {"t": (0, 2), "dt": 0.1}),
     "yielding": (yielding, DAMPED, STEPS),
-    "yielding, degree 2": (yielding, DAMPED, {**STEPS, "dt": 0.005, "mesh": ub.Mesh(degree=2)}),
     "Perzyna": (viscous, DAMPED, STEPS),
     "Duvaut-Lions": (relaxing, DAMPED, STEPS),
     "softening": (softening, DAMPED, STEPS),

@@ -153,7 +153,7 @@ def thrown():
     return ub.Scene([beam], initial=[ub.Velocity([beam], linear=(1, 2), angular=5.0)])
 
 
-@pytest.mark.parametrize(("dt", "degree"), [(0.005, 1), (0.05, 1), (0.02, 2), (0.02, 3)])
+@pytest.mark.parametrize(("dt", "degree"), [(0.005, 1), (0.05, 1), (0.02, 2)])
 def test_decaying_midpoint_in_large_motion(dt, degree):
     mesh = ub.Mesh(degree=degree)
     solution = go(thrown(), ub.EnergyMomentumDecaying(), 1.0, round(1 / dt), mesh=mesh)

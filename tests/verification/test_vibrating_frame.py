@@ -48,7 +48,7 @@ def at_the_corner(energy, end):
     return swing([ub.Beam((0, 1), (1, 1), section, cells=8, corners=(0.95,), hinges=hinges)], end)
 
 
-@pytest.mark.parametrize("energy", [0.4, 0.6, 0.8])
+@pytest.mark.parametrize("energy", [0.4, 0.8])
 def test_a_hinge_that_opens_completely_takes_its_fracture_energy(energy):
     """[closed] The frame keeps the work of the impulse less G_f; exp(-t_u x/G_f) = 1e-7 remains."""
     solution, _ = at_the_corner(energy, 15.0)
