@@ -2,8 +2,7 @@
 """Limit loads of beams and frames, and a cantilever that breaks: S17 of the reference.
 
 Plastic hinges are bulk cells with a yield moment M_p.  The moment of a cell is that of its middle:
-where the moment has a corner, cells are a thousandth of the beam, the error of the limit load is
-h/2.
+where the moment has a corner, cells are a thousandth of the beam.
 """
 
 import math
@@ -18,7 +17,6 @@ import ufl_beam as ub
 M_P, EI = 1.0, 1e4  # N m, N m²
 TINY = 1e-3
 """Cells where the moment has a corner, over the beam."""
-
 
 SECTION = ub.Section(
     EA=1e3 * EI, GA=1e3 * EI, EI=EI, bending=ub.ElastoPlastic(M_P, isotropic=1e-8 * EI)
