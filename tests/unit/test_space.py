@@ -339,14 +339,14 @@ def crane():
     )  # fmt: skip
 
 
-def test_files_have_the_results(tmp_path):
+def test_files_have_the_results(shared_path):
     """XDMF and VTKHDF have the same numbers, which are those of the solution."""
     import h5py
 
-    scene, files = crane(), (ub.VTKHDF(tmp_path / "a.hdf"), ub.XDMF(tmp_path / "a.xdmf"))
+    scene, files = crane(), (ub.VTKHDF(shared_path / "a.hdf"), ub.XDMF(shared_path / "a.xdmf"))
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=files, progress=False)
-    text = (tmp_path / "a.xdmf").read_text("utf-8")
-    with h5py.File(tmp_path / "a.hdf") as file:
+    text = (shared_path / "a.xdmf").read_text("utf-8")
+    with h5py.File(shared_path / "a.hdf") as file:
         points, cells = file["VTKHDF/PointData"], file["VTKHDF/CellData"]
         last = {name: values[-len(values) // 6 :] for name, values in points.items()}
         forces = {name: values[-len(values) // 6 :] for name, values in cells.items()}
