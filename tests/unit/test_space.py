@@ -2,6 +2,7 @@
 """Scenes in space: equality with the plane, balances, restart, and errors before a run."""
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -181,6 +182,37 @@ def test_restart_in_space_changes_no_bit():
     )
     for one, other in zip(whole.scene.beams, first.scene.beams, strict=True):
         assert (whole.displacement(one.at(0.3))[-1] == second.displacement(other.at(0.3))[-1]).all()
+
+
+@dataclass(frozen=True)
+class Stiffening(ub.extend.ConnectorLaw):
+    """A law of a user."""
+
+    def energy(self, motion, *_):
+        return 30 * motion**2 + 100 * motion**4
+
+
+@pytest.mark.parametrize("law", [*LAWS, "own law"])
+def test_start_with_a_connector_at_an_arm(law):
+    """The motion at the beginning depends on the rotation of the body in the earlier run."""
+    beam = ub.Beam((0, 0, 0), (2, 1, 0), ub.Section(**STIFF, **OTHER), cells=3)
+    wheel = ub.Body((2.5, 1, 0.3), mass=2.0, inertia=(1, 1, 1.5))
+    one = LAWS.get(law, Stiffening())
+    pull = ub.Stretch(wheel.at(2.6, 1, 0.4), ub.ground(3, 0, 2), one)
+    scene = ub.Scene(
+        [beam], bodies=[wheel], supports=[ub.Clamped(beam.start)], connectors=[pull],
+        joints=[ub.Revolute(beam.end, wheel.at(2, 1, 0), axis=(0, 0, 1))],
+        loads=[ub.Gravity((0, 0, -9.81))],
+    )  # fmt: skip
+    whole = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, progress=False)
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.05, progress=False)
+    second = ub.simulate(
+        scene, ub.EnergyMomentum(), t=(0.5, 1), dt=0.05, start=first, progress=False
+    )
+    results = (lambda run: run.displacement(wheel.middle)), (lambda run: run.connector(pull).force)
+    for result in results:
+        there = result(whole)[10:]
+        assert np.abs(result(second) - there).max() < 1e-11 * max(1.0, np.abs(there).max())
 
 
 def bend(cells):

@@ -7,6 +7,7 @@ and the motion in a step.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -411,6 +412,14 @@ class ConnectorBlock(Block):
     def motion(self, q: Array) -> Array:
         """Return the relative motions at ``q``; (num_connectors,); m or rad."""
         return self._in_step(q, "motion")
+
+    def motion_at_begin(self, q: Array) -> Array:
+        """Return the relative motions in a state, where the next step begins; (num_connectors,).
+
+        In space, a rotation is the state of a node and its change in a step.
+        """
+        self._begin(q, float(self._t[0]), dt=math.inf, fraction=0.0)
+        return self.motion(q)
 
     def _in_step(self, q: Array, field: str) -> Array:
         """Return a recorded number of a step to ``q``, which is not accepted; (num_connectors,)."""

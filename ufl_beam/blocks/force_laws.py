@@ -378,7 +378,7 @@ class FunctionBlock(ConnectorBlock):
 
     def start(self, q: Array) -> None:
         """See the base class: compute the stored energies of the accepted variables."""
-        for i, (law, e) in enumerate(zip(self._laws, self.motion(q), strict=True)):
+        for i, (law, e) in enumerate(zip(self._laws, self.motion_at_begin(q), strict=True)):
             at = divmod(i, BATCH)
             self.state["e"][at] = e
             self.state["energy"][at] = self.input("new energy")[at] = law.stored(float(e))

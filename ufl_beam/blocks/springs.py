@@ -75,7 +75,7 @@ class SpringBlock(ConnectorBlock):
 
     def start(self, q: Array) -> None:
         """See the base class."""
-        e = self._at(self.motion(q))
+        e = self._at(self.motion_at_begin(q))
         self.points.start(e)
         self.points.refresh(e)
         super().start(q)

@@ -219,7 +219,7 @@ class Simulation(Stepper):
         for group in equation.connector_terms:
             if group.law is RIGID:
                 size = equation.subdomain.numbering.scene.size
-                require_held(group.connectors, group.motion(q), size)
+                require_held(group.connectors, group.motion_at_begin(q), size)
 
     def _meet(self, equation: StepEquation, impact: Impact | None) -> None:
         """Change the velocities of this process by an impact, if there is one."""
