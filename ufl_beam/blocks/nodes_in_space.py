@@ -52,7 +52,7 @@ def change(at: Inputs, names: str, k: int) -> Vector:
 def new_state(turns: Sequence[Turn], to_node: Vector | None = None) -> dict[str, Expr]:
     """Return the quaternions after the step.
 
-    ``to_node`` is a quaternion that turns the axes of an element into those of its nodes.
+    ``to_node`` is a quaternion that turns the axes of an element into the axes of its nodes.
     """
     found = dict[str, Expr]()
     for k, turn in enumerate(turns):

@@ -70,8 +70,8 @@ def i_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
 
     ``r`` is the radius of the fillets between web and flanges; m.  ``material`` are arguments
     of ``Section.of_shape``.  By default the shear area is ``tw (h - tf)``, the web, or
-    ``5/3 b tf``, the flanges, about the weak axis.  The torsion constant is that of El Darwish and
-    Johnston (Proc. ASCE 91, ST1, 1965), as in European tables.  Its error is below 4 % for
+    ``5/3 b tf``, the flanges, about the weak axis.  The torsion constant follows El Darwish
+    and Johnston (Proc. ASCE 91, ST1, 1965), as in European tables.  Its error is below 4 % for
     r <= 1.5 tf and for all sections of :func:`steel`.  Give ``torsion=`` if r > 2 tf, tw > 1.5 tf
     or b < 2 tw, where the formula does not hold.
 
@@ -88,7 +88,7 @@ def channel(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material
 
     About the weak axis, the web is to the right of the direction of the beam.  ``material`` are
     arguments of ``Section.of_shape``; the defaults of the shear factors are Cowper's (1966) for
-    thin walls and Poisson's ratio 0, and of the torsion constant that of :func:`i_shape`.  Scenes
+    thin walls and Poisson's ratio 0; the torsion constant is computed as for an I.  Scenes
     in space need ``centroid_only=True``, because the shear centre is behind the web.
 
     Example:
@@ -118,8 +118,8 @@ def box(b: float, h: float, t: float, r: float = 0.0, **material: Any) -> Sectio
     """Create a rectangular hollow section: width b, depth h, wall t, outer corner radius r; m.
 
     The inner radius is r - t, or 0.  ``material`` are arguments of ``Section.of_shape``; the
-    defaults of the shear factors are Cowper's (1966) for thin walls and Poisson's ratio 0, and of
-    the torsion constant that of EN 10210-2.
+    defaults of the shear factors are Cowper's (1966) for thin walls and Poisson's ratio 0, and
+    the torsion constant follows EN 10210-2.
 
     Example:
         >>> column = st.box(b=0.2, h=0.3, t=0.01, r=0.02, E=210e9, nu=0.3, rho=7850.0)
@@ -175,7 +175,7 @@ def _torsion_of_flanged(
 ) -> float | None:
     """Return the torsion constant of an I, C or T by El Darwish and Johnston; m⁴.
 
-    The formulas are those of SCI P385.  The result is None where they do not hold: with finite
+    SCI P385 has the formulas.  The result is None where they do not hold: with finite
     differences of Prandtl's stress function they differ by up to 10 % within the limits below,
     and by up to 50 % outside.
     """
