@@ -22,7 +22,7 @@ QUICK = {
 """Names and verdicts."""
 
 
-@pytest.mark.parametrize(("name", "verdict"), QUICK.items())
+@pytest.mark.parametrize(("name", "verdict"), list(QUICK.items()))
 def test_a_quick_model_ends_as_it_should(name, verdict):
     """A stop is at the limit load of linear programming on the displaced geometry, to 0.1 %."""
     assert judged(MODELS[name])["verdict"] == verdict

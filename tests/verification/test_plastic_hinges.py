@@ -82,7 +82,7 @@ def resistance(law, slip, rate=0.0):
     return law.limit + (law.isotropic + law.kinematic) * slip + law.viscosity.eta * rate
 
 
-@pytest.mark.parametrize(("law", "s"), zip(LAWS, [0.0, 0.3, 1.0, 0.3], strict=True))
+@pytest.mark.parametrize(("law", "s"), list(zip(LAWS, [0.0, 0.3, 1.0, 0.3], strict=True)))
 def test_moment_of_a_hinge(law, s):
     """[closed] θ = M(α) L/EI + α; before the limit the jump is zero."""
     dt, θ = 0.01, 0.3
@@ -103,7 +103,7 @@ def test_moment_of_a_hinge(law, s):
 
 
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize(("scheme", "dt"), zip(EXACT, [0.1, 0.013, 0.1, 0.013], strict=True))
+@pytest.mark.parametrize(("scheme", "dt"), list(zip(EXACT, [0.1, 0.013, 0.1, 0.013], strict=True)))
 def test_ledger_of_cycles(law, scheme, dt):
     """To and fro at any step: the ledger closes to 1e-9, nothing dissipated is given back."""
     swing = ub.Table([0, 1, 2, 3], [0.0, 0.1, -0.15, 0.2])

@@ -99,12 +99,12 @@ def others_in_space(shape: DeformedShape) -> dict[str, list[Any]]:
         place = joint.places[0]
         if (axis := getattr(joint, "axis", None)) is not None:
             turned = Rotation.from_rotvec(shape.motion(place)[3:]).apply(axis)
-            pin = Cylinder(shape.at(place), turned, radius=0.5 * unit, height=2.0 * unit)
+            at, height = shape.at(place), 2.0 * unit
+            pin = Cylinder(center=at, direction=turned, radius=height / 4, height=height)
             meshes[PIN].append(pin.triangulate())
         elif joint.meets and len(joint.holders) == 3:
             meshes[PIN].append(ball(place, 0.6))
     for support in scene.supports:
-        at = shape.at(support.place)
-        size = 1.6 * unit
-        meshes[GREY].append(Cube(at, size, size, size).triangulate())
+        lengths = dict.fromkeys(("x_length", "y_length", "z_length"), 1.6 * unit)
+        meshes[GREY].append(Cube(center=shape.at(support.place), **lengths).triangulate())
     return {color: several for color, several in meshes.items() if several}
