@@ -516,3 +516,30 @@ def test_what_is_planar_says_so():
     for call in refused().values():
         with pytest.raises(ub.ModelError, match="only for scenes in the plane"):
             call()
+
+
+def pendulums():
+    """Two bodies on ball joints at their arms."""
+    upper = ub.Body((0.15, 0, -0.2), mass=1.0, inertia=(0.03, 0.02, 0.01), name="upper")
+    lower = ub.Body((0.3, 0.25, -0.4), mass=2.0, inertia=(0.02, 0.05, 0.04), name="lower")
+    elbow = [body.at(0.3, 0, -0.4) for body in (upper, lower)]
+    joints = [ub.Spherical(ub.ground(0, 0, 0), upper.at(0, 0, 0)), ub.Spherical(*elbow)]
+    return ub.Scene(bodies=[upper, lower], joints=joints, loads=[ub.Gravity((0, 0, -9.81))])
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-6])
+def test_joints_at_arms_are_exact_at_rest(dt):
+    """Motions of 1e-12 of the arms have their own digits."""
+    newton = ub.Newton(rtol=1e-13)
+    run = ub.simulate(
+        pendulums(), ub.EnergyMomentum(), t=(0, 20 * dt), dt=dt, newton=newton, progress=False
+    )
+    moved = np.abs(run.displacement(run.scene.bodies[1].at(0.3, 0, -0.4))[-1, :3])
+    assert 0 < moved.max() < 9.81 * (20 * dt) ** 2
+
+
+def test_a_failed_step_names_the_residual():
+    scene = pendulums()
+    with pytest.raises(ub.ConvergenceError, match=r"inertia .* N"):
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.5, progress=False,
+                    newton=ub.Newton(max_iterations=1))  # fmt: skip

@@ -324,7 +324,7 @@ def bodies_in_space(setting: BlockSetting) -> list[BodiesInSpace]:
     numbers = np.array([np.ravel(body.tensor) for body in bodies]).T
     elements = Elements("bodies in space", np.arange(len(bodies)), nodes, [*numbers])
     statement = TurningBody(setting.scheme)
-    return [BodiesInSpace(statement, elements, setting, kind="inertia of bodies")]
+    return [BodiesInSpace(statement, elements, setting, kind="inertia")]
 
 
 class DeadMoments(Block):

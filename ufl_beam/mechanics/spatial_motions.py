@@ -23,9 +23,9 @@ from ufl_beam.mechanics.spatial_kinematics import (
     cross,
     dot,
     forces_over_step,
-    matrix,
     subtract,
     times,
+    turned,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end
 
@@ -53,12 +53,20 @@ class NodeInStep:
         self, u0: Vector, u1: Vector, turn: Turn, w_u: Vector, w_m: Vector, scheme: Scheme
     ) -> None:
         self.u0, self.u1, self.turn, self.w_u = u0, u1, turn, w_u
-        self._scheme, self._frames = scheme, (matrix(turn.q0), matrix(turn.q1))
+        self._scheme, self._turned = scheme, (turned(turn.q0), turned(turn.q1))
         self.w_θ = turn.virtual_rotation(w_m, at_end=acts_at_end(scheme))
+
+    def changes(self, x: Vector) -> tuple[Vector, Vector]:
+        """Return the change of a vector that is fixed in the node, before and after the step.
+
+        Small rotations do not lose the digits that a difference of vectors would lose.
+        """
+        before, after = (times(rows, x) for rows in self._turned)
+        return before, after
 
     def ends(self, x: Vector) -> tuple[Vector, Vector]:
         """Return a vector that is fixed in the node, before and after the step."""
-        before, after = (times(frame, x) for frame in self._frames)
+        before, after = (add(x, change) for change in self.changes(x))
         return before, after
 
     def variation(self, arm: Vector) -> Vector:
@@ -71,16 +79,11 @@ def average(scheme: Scheme, before: Vector, now: Vector) -> Vector:
     return tuple(scheme.average(x, y) for x, y in zip(before, now, strict=True))
 
 
-def _between(a: NodeInStep, b: NodeInStep, n: GeometryInSpace) -> tuple[Vector, Vector]:
-    """Return the vectors from point a to point b, before and after the step."""
-    found = list[Vector]()
-    arms = zip(a.ends(n.arm_a), b.ends(n.arm_b), (a.u0, a.u1), (b.u0, b.u1), strict=True)
-    for arm_a, arm_b, u_a, u_b in arms:
-        moved = add(
-            subtract(u_b, u_a), subtract(subtract(arm_b, n.arm_b), subtract(arm_a, n.arm_a))
-        )
-        found.append(add(n.apart, moved))
-    return found[0], found[1]
+def _moved(a: NodeInStep, b: NodeInStep, n: GeometryInSpace) -> tuple[Vector, Vector]:
+    """Return the displacements of point b relative to point a, before and after the step."""
+    arms = zip(a.changes(n.arm_a), b.changes(n.arm_b), (a.u0, a.u1), (b.u0, b.u1), strict=True)
+    before, now = (add(subtract(u_b, u_a), subtract(y, x)) for x, y, u_a, u_b in arms)
+    return before, now
 
 
 def _varied(a: NodeInStep, b: NodeInStep, n: GeometryInSpace) -> Vector:
@@ -91,7 +94,7 @@ def parting_in_space(
     a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
 ) -> tuple[Expr, Expr, Expr]:
     """Return the displacement of b relative to a along a fixed axis; m."""
-    before, now = (dot(n.axis, subtract(d, n.apart)) for d in _between(a, b, n))
+    before, now = (dot(n.axis, d) for d in _moved(a, b, n))
     return before, now, dot(n.axis, _varied(a, b, n))
 
 
@@ -99,10 +102,10 @@ def stretching_in_space(
     a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
 ) -> tuple[Expr, Expr, Expr]:
     """Return the growth of the distance between the points; m."""
-    ends, length = _between(a, b, n), ufl.sqrt(dot(n.apart, n.apart))
+    moved, length = _moved(a, b, n), ufl.sqrt(dot(n.apart, n.apart))
+    ends = [add(n.apart, d) for d in moved]
     lengths = [ufl.sqrt(dot(d, d)) for d in ends]
     # (d·d - d0·d0) / (|d| + |d0|); a difference of lengths would lose digits
-    moved = [subtract(d, n.apart) for d in ends]
     before, now = (
         dot(add(d, n.apart), u) / (size + length)
         for d, u, size in zip(ends, moved, lengths, strict=True)
@@ -115,10 +118,13 @@ def sliding_in_space(
     a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
 ) -> tuple[Expr, Expr, Expr]:
     """Return the displacement of b from a along an axis that is fixed in a; m."""
-    axes, ends = a.ends(n.axis), _between(a, b, n)
-    begun = dot(n.axis, n.apart)
-    before, now = (dot(axis, d) - begun for axis, d in zip(axes, ends, strict=True))
-    axis, between = average(scheme, *axes), average(scheme, *ends)
+    moved, changes = _moved(a, b, n), a.changes(n.axis)
+    ends = [add(n.apart, d) for d in moved]
+    before, now = (
+        dot(n.axis, d) + dot(change, end)
+        for d, change, end in zip(moved, changes, ends, strict=True)
+    )
+    axis, between = average(scheme, *a.ends(n.axis)), average(scheme, *ends)
     return before, now, dot(axis, _varied(a, b, n)) + dot(a.w_θ, cross(axis, between))
 
 
@@ -126,9 +132,14 @@ def aligning_in_space(
     a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
 ) -> tuple[Expr, Expr, Expr]:
     """Return the change of the product of an axis that is fixed in a and another fixed in b."""
-    axes, others, begun = a.ends(n.axis), b.ends(n.other), dot(n.axis, n.other)
-    before, now = (dot(x, y) - begun for x, y in zip(axes, others, strict=True))
-    torque = cross(average(scheme, *axes), average(scheme, *others))
+    others = b.ends(n.other)
+    before, now = (
+        dot(change, other) + dot(n.axis, of_other)
+        for change, other, of_other in zip(
+            a.changes(n.axis), others, b.changes(n.other), strict=True
+        )
+    )
+    torque = cross(average(scheme, *a.ends(n.axis)), average(scheme, *others))
     return before, now, dot(subtract(a.w_θ, b.w_θ), torque)
 
 
