@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -60,17 +62,80 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
     return A
 
 
-def strains_in_space(fields: Fields, q: Array, turns: Array) -> Array:
-    """Return the strains along, and curvatures about, axes 1, 2, 3 of cells; (n, 6); 1, 1/m."""
-    numbering, (lengths, axes) = fields.subdomain.numbering, cell_axes(fields)
-    a, b = numbering.cells.T
-    at = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
-    first, second = _rotations(turns[a]), _rotations(turns[b])
-    between = (first.inv() * second).as_rotvec()
-    middle = first * Rotation.from_rotvec(between / 2)
-    slope = middle.inv().apply((at[b] - at[a]) / lengths[:, None])
-    both = (np.einsum("nik,ni->nk", axes, x) for x in (slope, between / lengths[:, None]))
-    return np.asarray(np.hstack([*both]) - np.eye(6)[0])
+class CellsOfState(NamedTuple):
+    """Cells in a state.
+
+    Attributes:
+        slopes: Derivatives of the position along the axes of cells; (n, 3).
+        first: Rotations of the first nodes.
+        between: Rotation vectors from node to node, in axes of the nodes; (n, 3); rad.
+        lengths: Undeformed lengths; (n,); m.
+        axes: Undeformed axes of cells as columns; (n, 3, 3).
+    """
+
+    slopes: Array
+    first: Rotation
+    between: Array
+    lengths: Array
+    axes: Array
+
+    @classmethod
+    def of(cls, fields: Fields, q: Array, turns: Array) -> CellsOfState:
+        """Return the cells in the configuration ``q``; ``turns`` are quaternions (nodes, 4)."""
+        numbering, (lengths, axes) = fields.subdomain.numbering, cell_axes(fields)
+        a, b = numbering.cells.T
+        at = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
+        first, second = _rotations(turns[a]), _rotations(turns[b])
+        slopes = (at[b] - at[a]) / lengths[:, None]
+        return cls(slopes, first, (first.inv() * second).as_rotvec(), lengths, axes)
+
+    def frames(self, fraction: float) -> Rotation:
+        """Return the rotations of the cross-sections at a fraction of the cells."""
+        return self.first * Rotation.from_rotvec(fraction * self.between)
+
+    def in_section(self, fraction: float, *vectors: Array) -> Array:
+        """Return vectors (n, 3) in the axes 1, 2, 3 of the sections, side by side."""
+        back = self.frames(fraction).inv()
+        turned = [np.einsum("nik,ni->nk", self.axes, back.apply(x)) for x in vectors]
+        return np.asarray(np.hstack(turned))
+
+    def strains(self) -> Array:
+        """Return the strains along, and curvatures about, axes 1, 2, 3; (n, 6); 1, 1/m."""
+        curvatures = self.frames(0.5).apply(self.between / self.lengths[:, None])
+        return self.in_section(0.5, self.slopes, curvatures) - np.eye(6)[0]
+
+    def section_forces(self, fractions: Array, resultants: Array, along: Array) -> Array:
+        """Return forces along, and moments about, axes 1, 2, 3 at fractions; (n, points, 6).
+
+        At the ends they are the forces between cells and nodes, and in between they are in
+        equilibrium with them.
+
+        Args:
+            fractions: Fractions from 0 at the start to 1 at the end; (points,).
+            resultants: Products of stiffnesses and :meth:`strains`; (n, 6); N, N m.
+            along: Forces of loads along the cells on their nodes; (n, 2, 3); N.
+        """
+        middle = self.frames(0.5)
+        force, moment = (
+            middle.apply(np.einsum("nik,nk->ni", self.axes, x)) for x in np.hsplit(resultants, 2)
+        )
+        # Both nodes turn the middle; the rotation vector does work on the rotation between them
+        angle = np.linalg.norm(self.between, axis=1)[:, None]
+        n = middle.apply(self.between / np.where(angle > 0.0, angle, 1.0))
+        lever = self.lengths[:, None] * np.cross(self.slopes, force)
+        twist = np.sum(n * moment, axis=1)[:, None] * n
+        moment = twist + (moment - twist) / np.sinc(angle / 2 / np.pi)
+        moment = moment - np.tan(angle / 4) / 2 * np.cross(n, lever)
+        sides = force + along[:, 0], force - along[:, 1]
+        levers = [self.lengths[:, None] * np.cross(self.slopes, x) for x in sides]
+        found = []
+        for s in fractions:
+            local = (1 - s) * sides[0] + s * sides[1]
+            bubble = moment + (0.5 - s) * lever
+            # Loads between the nodes: the integral of their levers, and linear to both ends
+            change = (levers[1] - levers[0]) * (s - s**2) / 2
+            found.append(self.in_section(s, local, bubble + change))
+        return np.stack(found, axis=1)
 
 
 def momentum_in_space(numbering: DofNumbering, q: Array, p: Array, turns: Array) -> Array:

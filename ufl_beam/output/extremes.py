@@ -205,7 +205,8 @@ class Extremes(Restartable):
     count as their substeps.  Memory does not grow with the number of steps.  Section forces are
     evaluated at equally spaced points of each cell, both ends included, as in
     :meth:`Solution.diagram`.  During a run, processes that share the scene have the extremes up to
-    the end of the last whole step.
+    the end of the last whole step.  In space Python updates the extremes after each whole step,
+    and rotations are those of :meth:`Solution.displacement`.
 
     Args:
         points: Number of points of a cell, at least 2.
@@ -234,14 +235,14 @@ class Extremes(Restartable):
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin with the initial state, or continue from a :meth:`state`."""
-        simulation.scene.require_plane("Extremes")
         self._numbering: DofNumbering = simulation.numbering
         self._solution = simulation.solution
         if self._accelerated and not has_inertia(simulation.scheme):
             raise ArgumentError("Extremes: accelerations: the run is static; there are none")
-        self.by_itself = simulation.subdomain.alone and not self._accelerated
-        size = self._numbering.size
-        shapes = (len(self._numbering.cells), len(self._fractions), 3), (size,), (size,)
+        in_space, size = simulation.scene.in_space, self._numbering.size
+        self.by_itself = simulation.subdomain.alone and not self._accelerated and not in_space
+        forces = 6 if in_space else 3
+        shapes = (len(self._numbering.cells), len(self._fractions), forces), (size,), (size,)
         self._taken = []
         for what, shape in zip(self._names, shapes, strict=False):
             extent = Extent(*(np.full(shape, x) for x in (np.inf, -np.inf, 0.0, 0.0)))
@@ -250,8 +251,9 @@ class Extremes(Restartable):
                 require_arrays(state, dict.fromkeys(names, shape))
                 extent = Extent(*(state[name].copy() for name in names))
             self._taken.append(extent)
-        self._in_c = simulation.watch(self._fractions)
-        self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
+        if not in_space:
+            self._in_c = simulation.watch(self._fractions)
+            self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
         self._before: Array = np.full((1 + size) * self._accelerated, np.nan)
         if state is None:
             self.write(simulation)
@@ -266,20 +268,33 @@ class Extremes(Restartable):
 
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
-        self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
+        if self._in_c is None:  # in space
+            now, numbering = simulation.now, self._numbering
+            motion = now.q[0]
+            motion[numbering.dofs] = now.motion_of_nodes(0)
+            for body, dofs in zip(simulation.scene.bodies, numbering.dofs_of_bodies, strict=False):
+                motion[dofs] = now.displacement(body.middle)[0]
+            self._widen(0, now.cell_forces(0, self._fractions), simulation.t)
+            self._widen(1, motion, simulation.t)
+        else:
+            self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
         if self._accelerated:
             v = simulation.subdomain.gather(simulation.velocities()[0])
-            now = np.append(simulation.t, v)
-            change = now - self._before
-            self._before[:] = now
-            values, extent = change[1:] / change[0], self._taken[2]
-            for reached, when, beyond in (
-                (extent.low, extent.time_low, values < extent.low),
-                (extent.high, extent.time_high, values > extent.high),
-            ):
-                if beyond.any():
-                    reached[beyond] = values[beyond]
-                    when[beyond] = simulation.t
+            latest = np.append(simulation.t, v)
+            change = latest - self._before
+            self._before[:] = latest
+            self._widen(2, change[1:] / change[0], simulation.t)
+
+    def _widen(self, quantity: int, values: Array, t: float) -> None:
+        """Extend the extremes of a quantity by its values at the time ``t``."""
+        extent = self._taken[quantity]
+        for reached, when, beyond in (
+            (extent.low, extent.time_low, values < extent.low),
+            (extent.high, extent.time_high, values > extent.high),
+        ):
+            if beyond.any():
+                reached[beyond] = values[beyond]
+                when[beyond] = t
 
     def close(self) -> None:
         """Stop recording; the extremes remain available."""
@@ -323,15 +338,17 @@ class Extremes(Restartable):
         """Return extremes of (N, V, M) at points of the cells of a beam; N, N, N m.
 
         Rows have the order of a :class:`Diagram` with the same points; (num_cells · points, 3).
+        In space, columns are those of a :class:`DiagramInSpace`; (num_cells · points, 6).
 
         Raises:
             ArgumentError: The beam is not in the scene, or nothing was run.
         """
         cells = self.numbering.cells_of(beam)
-        return Extent(*(x.reshape(-1, 3) for x in self._extents[0].subset(cells)))
+        found = self._extents[0].subset(cells)
+        return Extent(*(x.reshape(-1, x.shape[2]) for x in found))
 
     def displacement(self, owner: Member | Body) -> Extent:
-        """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
+        """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3 or 6); m, m, rad.
 
         Rows follow a beam from start to end: its vertices and, between them, the inner nodes of
         cells of higher degree.  At a hinge ψ is as in :meth:`Solution.displacement` of the place.
@@ -368,5 +385,5 @@ class Extremes(Restartable):
         """Return the extremes of a quantity at the nodes of a beam or body; (n, 3)."""
         numbering = self.numbering
         if isinstance(owner, Body):
-            return self._extents[quantity].subset(numbering.node(owner.middle).reshape(1, 3))
+            return self._extents[quantity].subset(numbering.node(owner.middle)[None])
         return self._extents[quantity].subset(numbering.dofs[numbering.nodes_along(owner)])

@@ -44,6 +44,29 @@ class Diagram(NamedTuple):
 
 
 @in_one_line
+class DiagramInSpace(NamedTuple):
+    """Section forces along a beam in space, in axes of the sections; (num_cells · points,).
+
+    Attributes:
+        s: Parameter of the beam, from 0 at its start to 1 at its end.
+        N: Axial force, positive in tension; N.
+        V2: Shear force along axis 2; N.
+        V3: Shear force along axis 3; N.
+        T: Torsional moment; N m.
+        M2: Bending moment about axis 2, positive with tension on the side of axis 3; N m.
+        M3: Bending moment about axis 3, positive with tension on the side opposite to axis 2; N m.
+    """
+
+    s: Array
+    N: Array
+    V2: Array
+    V3: Array
+    T: Array
+    M2: Array
+    M3: Array
+
+
+@in_one_line
 class Material(NamedTuple):
     """State of the material in n cells at one time, or in one cell at n times.
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import Any
 
 from mpi4py import MPI
 
@@ -17,9 +18,9 @@ from ufl_beam.discretization.cell_functions import mass_matrix, strains_of
 from ufl_beam.discretization.cells_in_space import (
     STIFFNESS_IN_SPACE,
     TURNS,
+    CellsOfState,
     momentum_in_space,
     rotation_vectors,
-    strains_in_space,
     turns_at,
 )
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
@@ -29,11 +30,19 @@ from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.functions import value_at
+from ufl_beam.model.loads import Gravity, LineLoad
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import index_of
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
-from ufl_beam.output.section_forces import MIDDLE, Diagram, ForcesAlongCells, Material
+from ufl_beam.output.section_forces import (
+    MIDDLE,
+    Diagram,
+    DiagramInSpace,
+    ForcesAlongCells,
+    Material,
+)
 from ufl_beam.output.state_rows import (
     BEFORE,
     FORCE,
@@ -53,6 +62,7 @@ from ufl_beam.output.state_rows import (
     new_rows,
     signs_on_second_place,
 )
+from ufl_beam.terms.dead_loads import add_dead_load
 from ufl_beam.terms.energy_ledger import Energy
 
 LEAST_ROWS, MOST_VALUES = 8, 2**17
@@ -461,9 +471,10 @@ class States:
             pieces: Fractions of the length of a cell, from 0 to 1, by default the middle.
 
         Returns:
-            Section forces; (num_cells, len(pieces), 3); N, N, N m.
+            Section forces; (num_cells, len(pieces), 3 or 6); N, N, N m.
         """
-        self.scene.require_plane("section forces within cells")
+        if self.scene.in_space:
+            return self._in_cells_of_space(n, pieces)
         key = self.index(n), pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
             along, q = self.cells.along, self._in_equilibrium(n)
@@ -471,6 +482,20 @@ class States:
             forces.flags.writeable = False
             self._computed = key, forces
         return self._computed[1]
+
+    def _in_cells_of_space(self, n: int, pieces: Array) -> Array:
+        """Compute section forces of strains of a state, and of dead loads along cells."""
+        fields, t = self.cells.fields, float(self._row("t", n))
+        cells = CellsOfState.of(fields, self._row("q", n), self._row(TURNS, n))
+        along: Array = np.zeros((len(cells.lengths), 6, 2))
+        for load in (x for x in self.scene.loads if isinstance(x, Gravity | LineLoad)):
+            factor = value_at(load.amplitude, t, load)
+            some = add_dead_load(load, fields.subdomain, np.zeros(self.numbering.size))
+            if some is not None:  # gravity also acts on bodies
+                along[some[0]] += factor * some[1].reshape(-1, 6, 2)
+        stiffness = fields.section_values(*STIFFNESS_IN_SPACE)
+        on_nodes = along[:, :3].transpose(0, 2, 1)
+        return cells.section_forces(pieces, stiffness * cells.strains(), on_nodes)
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
         """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m.
@@ -490,6 +515,8 @@ class States:
     def section_forces_at(self, place: Place) -> Array:
         """Return (N, V, M) of :meth:`diagram` at a place; (n+1, 3); N, N, N m.
 
+        In space, return (N, V2, V3, T, M2, M3); (n+1, 6).
+
         At an inner vertex the values belong to the end of the cell before the vertex.
 
         Raises:
@@ -505,8 +532,11 @@ class States:
 
         With ``in_plane`` forces along x and y are returned instead of N and V.
         """
-        self.scene.require_plane("section forces at places")
         n, chosen = range(len(self)), np.array(cells, dtype=np.int64)
+        if self.scene.in_space:
+            fractions = np.array(fractions)
+            rows = (self.cell_forces(k, fractions)[chosen, range(len(chosen))] for k in n)
+            return np.array([*rows])
         dofs, forces = self.cells.along.dofs[chosen], np.zeros((len(n), len(chosen), 3))
         q = np.array([self._in_equilibrium(k)[dofs] for k in n])
         resultants = np.array([self.cell_resultants(k)[:, chosen] for k in n])
@@ -517,10 +547,10 @@ class States:
             )[:, 0]  # fmt: skip
         return forces
 
-    def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
+    def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Any:
         """Return section forces along a beam, by equilibrium of cells, at the n-th time.
 
-        Section forces satisfy the equation of the step that ends at this time, with inertia,
+        The result is a :class:`Diagram`, in space a :class:`DiagramInSpace`.  Section forces satisfy the equation of the step that ends at this time, with inertia,
         damping, loads and users' virtual works.  At a support they agree with its :meth:`reaction`
         in the axes of the section, which turn with the beam.  Each cell has ``points`` equally
         spaced points, both ends included; their parameters ``s`` run from 0 at the start of the
@@ -530,6 +560,10 @@ class States:
         With ``start=`` and the same scheme, a run begins with the last forces of the earlier run.
         Other static runs begin without section forces, other dynamic runs with stresses only.
 
+        In space, section forces are those of the strains of the state, with dead loads along the
+        beam.  They are in equilibrium with all forces of statics.  Inertia within a cell is left
+        out, so that V and N at the ends of cells have errors of first order in their length.
+
         Raises:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
         """
@@ -537,7 +571,8 @@ class States:
         s, fractions = self.numbering.parameters(beam), np.arange(int(points)) / (int(points) - 1)
         at = s[:-1, None] + fractions * np.diff(s)[:, None]
         forces = self.cell_forces(n, fractions)[self.numbering.cells_of(beam)]
-        return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
+        kind = DiagramInSpace if self.scene.in_space else Diagram
+        return kind(at.ravel(), *forces.reshape(-1, forces.shape[2]).T)
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """Return (Σ, Γ, K) in the cells of a beam at the n-th time; (num_cells, 3); 1, 1, 1/m.
@@ -555,7 +590,8 @@ class States:
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         if self.scene.in_space:
-            return strains_in_space(self.cells.fields, self._row("q", n), self._row(TURNS, n))
+            cells = CellsOfState.of(self.cells.fields, self._row("q", n), self._row(TURNS, n))
+            return cells.strains()
         strains = np.empty((len(self.numbering.cells), 3))
         in_points = self.cells.strains(self._row("q", n)).reshape(len(strains), -1, 3)
         weights = self.numbering.mesh.point_weights

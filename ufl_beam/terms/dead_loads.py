@@ -50,7 +50,7 @@ class DeadLoads(LoadTerm):
         for load in loads:
             key = id(load.amplitude)
             _, vector = vectors.setdefault(key, (load, np.zeros(subdomain.size)))
-            if (in_some := _add_dead_load(load, subdomain, vector)) is not None:
+            if (in_some := add_dead_load(load, subdomain, vector)) is not None:
                 cells, on_nodes = in_some
                 in_cells.setdefault(key, np.zeros(subdomain.cell_dofs.shape))[cells] += on_nodes
         for key, along in in_cells.items():
@@ -139,7 +139,7 @@ class DeadLoads(LoadTerm):
             self._factors[2, k] = archive.number(f"part of dead loads {k}", factor)
 
 
-def _add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Index, Array] | None:
+def add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Index, Array] | None:
     """Add the concentrated forces of a dead load with the factor 1 to ``forces``.
 
     Returns:
