@@ -102,7 +102,7 @@ class CellsOfState(NamedTuple):
     def strains(self) -> Array:
         """Return the strains along, and curvatures about, axes 1, 2, 3; (n, 6); 1, 1/m."""
         curvatures = self.frames(0.5).apply(self.between / self.lengths[:, None])
-        return self.in_section(0.5, self.slopes, curvatures) - np.eye(6)[0]
+        return np.asarray(self.in_section(0.5, self.slopes, curvatures) - np.eye(6)[0])
 
     def section_forces(self, fractions: Array, resultants: Array, along: Array) -> Array:
         """Return forces along, and moments about, axes 1, 2, 3 at fractions; (n, points, 6).

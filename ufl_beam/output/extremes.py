@@ -348,7 +348,9 @@ class Extremes(Restartable):
         return Extent(*(x.reshape(-1, x.shape[2]) for x in found))
 
     def displacement(self, owner: Member | Body) -> Extent:
-        """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3 or 6); m, m, rad.
+        """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
+
+        In space they are extremes of the displacement and the rotation vector; (n, 6).
 
         Rows follow a beam from start to end: its vertices and, between them, the inner nodes of
         cells of higher degree.  At a hinge ψ is as in :meth:`Solution.displacement` of the place.

@@ -31,8 +31,8 @@ from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import value_at
-from ufl_beam.model.loads import Gravity, LineLoad
 from ufl_beam.model.joints import Joint
+from ufl_beam.model.loads import Gravity, LineLoad
 from ufl_beam.model.scene import index_of
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
@@ -534,8 +534,8 @@ class States:
         """
         n, chosen = range(len(self)), np.array(cells, dtype=np.int64)
         if self.scene.in_space:
-            fractions = np.array(fractions)
-            rows = (self.cell_forces(k, fractions)[chosen, range(len(chosen))] for k in n)
+            pieces = np.array(fractions)
+            rows = (self.cell_forces(k, pieces)[chosen, range(len(chosen))] for k in n)
             return np.array([*rows])
         dofs, forces = self.cells.along.dofs[chosen], np.zeros((len(n), len(chosen), 3))
         q = np.array([self._in_equilibrium(k)[dofs] for k in n])
@@ -550,7 +550,9 @@ class States:
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Any:
         """Return section forces along a beam, by equilibrium of cells, at the n-th time.
 
-        The result is a :class:`Diagram`, in space a :class:`DiagramInSpace`.  Section forces satisfy the equation of the step that ends at this time, with inertia,
+        The result is a :class:`Diagram`, in space a :class:`DiagramInSpace`.
+
+        Section forces satisfy the equation of the step that ends at this time, with inertia,
         damping, loads and users' virtual works.  At a support they agree with its :meth:`reaction`
         in the axes of the section, which turn with the beam.  Each cell has ``points`` equally
         spaced points, both ends included; their parameters ``s`` run from 0 at the start of the

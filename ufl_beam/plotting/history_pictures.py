@@ -25,6 +25,7 @@ from ufl_beam.plotting.frame_pictures import (
 )
 from ufl_beam.plotting.labels import MOST, arrange, plane_canvas
 from ufl_beam.plotting.positions import evenly
+from ufl_beam.plotting.space_pictures import draw_shapes_in_space
 from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
@@ -40,6 +41,17 @@ COMPONENTS = {
     "d2u/dt2": ("acceleration", "m/s²"), "d2v/dt2": ("acceleration", "m/s²"),
     "d2psi/dt2": ("angular acceleration", "rad/s²"),
 }  # fmt: skip
+
+COMPONENTS_IN_SPACE = {
+    f"{before}{name}{after}": (words[k], (f"m{per}", f"rad{per}")[k])
+    for before, after, per, *words in (
+        ("", "", "", "displacement", "rotation"),
+        ("d", "/dt", "/s", "velocity", "angular velocity"),
+        ("d2", "/dt2", "/s²", "acceleration", "angular acceleration"),
+    )
+    for k, names in enumerate((("u", "v", "w"), ("rx", "ry", "rz"))) for name in names
+}  # fmt: skip
+"""The same in space; rx, ry, rz are components of the rotation vector."""
 
 MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, in a notebook
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
@@ -75,6 +87,8 @@ def draw_shapes(
         if not len(requested):
             raise ArgumentError("plot: times is empty; give times (s), or count=")
         chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(requested)]
+    if solution.scene.in_space:
+        return draw_shapes_in_space(solution, chosen, magnify, ax)
     canvas, along = plane_canvas(solution, chosen, magnify, ax), solution.progress
     shapes = [canvas.shape(n) for n in chosen]
     with style.panel(ax, MOST) as axes:
@@ -104,7 +118,8 @@ def solution_page(solution: Solution) -> str:
     """
     text = notebook.lines(*solution.summary()) + notebook.energy_page(solution.energy)
     text += notebook.lines(solution.imbalance_message)
-    moved = solution.q[:, solution.numbering.dofs[:, :2]]
+    numbering = solution.numbering
+    moved = solution.q[:, numbering.dofs[:, : numbering.displacements]]
     fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
     shapes = partial(draw_shapes, solution, count=NUM_SHAPES, magnify=magnify)
@@ -119,19 +134,20 @@ def draw_history(
     ax: Axes | None = None,
 ) -> Figure:
     """Draw a component of the motion of one or more places over time."""
-    style.require_option(component, COMPONENTS, "plot: component")
+    components = COMPONENTS_IN_SPACE if solution.scene.in_space else COMPONENTS
+    style.require_option(component, components, "plot: component")
     followed = (places,) if isinstance(places, AttachmentPoint) else places
     followed = require_all(followed, "plot: places", (Place, BodyPoint))
     if not followed:
         raise ArgumentError("plot: places is empty; give places whose motion is drawn")
-    number = list(COMPONENTS).index(component)
-    motion = (solution.displacement, solution.velocity, solution.acceleration)[number // 3]
-    quantity, unit = COMPONENTS[component]
+    order, number = divmod(list(components).index(component), len(components) // 3)
+    motion = (solution.displacement, solution.velocity, solution.acceleration)[order]
+    quantity, unit = components[component]
     with style.panel(ax, (8.0, 4.2)) as axes:
         style.time_axes(axes)
         style.zero_lines(axes, x=False)
         for place in followed:
-            axes.plot(solution.times, motion(place)[:, number % 3], label=str(place))
+            axes.plot(solution.times, motion(place)[:, number], label=str(place))
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
         axes.set_xlabel(solution.parameter.name)
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)

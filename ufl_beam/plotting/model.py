@@ -41,6 +41,7 @@ from ufl_beam.model.works import Effect
 from ufl_beam.plotting import notebook, positions, style, symbols
 from ufl_beam.plotting.labels import MOST, Label, Spot, around, arrange, plane_canvas
 from ufl_beam.plotting.positions import directions, normal, points_along, unit_vectors
+from ufl_beam.plotting.space_pictures import draw_model_in_space
 from ufl_beam.plotting.style import (
     BLUE,
     GREEN,
@@ -86,6 +87,8 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     a motion are filled with orange; drives that prescribe a force are hollow.  Notes above the axes
     replace many equal labels.  Labels for which there is no space are omitted.
     """
+    if scene.in_space:
+        return draw_model_in_space(scene, ax=ax)
     require_independent(scene)
     with style.panel(ax, MOST) as axes:
         drawing = Drawing(plane_canvas(scene, ax=ax, filled=0.7))  # with space for loads

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Function for all pictures in the plane: of models, solutions and results of analyses."""
+"""Function for all pictures but solid ones: of models, solutions and results of analyses."""
 
 from __future__ import annotations
 
@@ -31,6 +31,11 @@ from ufl_beam.plotting.inelastic_pictures import (
 )
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
+from ufl_beam.plotting.space_pictures import (
+    DIAGRAMS,
+    draw_extremes_in_space,
+    draw_shape_in_space,
+)
 from ufl_beam.plotting.style import RESULTANTS
 from ufl_beam.simulation.solution import Solution
 
@@ -61,6 +66,23 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
 Modules that define further results add their pictures; see ``structures/pictures.py``.
 """
 
+IN_SPACE: dict[type, dict[str, Callable[..., Figure]]] = {
+    Scene: {"model": draw_model},
+    Solution: {
+        "shape": draw_shape_in_space,
+        **{name: partial(draw_shape_in_space, quantity=name) for name in DIAGRAMS},
+        "shapes": draw_shapes,
+        "history": draw_history,
+        "energy": draw_energy,
+        "dissipation": draw_dissipation,
+    },
+    Extremes: {
+        name: partial(draw_extremes_in_space, quantity=name)
+        for name in ("M3", "M2", "T", "N", "V2", "V3")
+    },
+}
+"""The same of scenes in space; other pictures are refused."""
+
 
 def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
     """Draw a model, a solution, or the result of an analysis.
@@ -87,6 +109,11 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     Study               "results"           results over the cases
     Tradeoff            "errors"            errors over wall times; ``ax``
     ==================  ==================  ========================================================
+
+    Scenes in space are drawn in a view with z up; ``ax`` then are axes in space.  A solution has
+    "N", "V", "T", "M", and the components "V2", "V3", "M2", "M3" in axes of the sections.  V and M
+    are drawn as vectors, M on the side of tension.  Extremes have components.  Components of
+    "history" are "u", "v", "w" and their rates, and "rx", "ry", "rz" of the rotation vector.
 
     Args:
         shown: Object to draw.
@@ -118,15 +145,19 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             f"plot: {shorten(shown)} is a {type(shown).__name__}, which has no picture; there are "
             f"pictures of {', '.join(kind.__name__ for kind in PICTURES)}"
         )
+    scene = shown if isinstance(shown, Scene) else getattr(shown, "scene", None)
+    scene = scene or getattr(getattr(shown, "solution", None), "scene", None)
+    if isinstance(scene, Scene) and scene.in_space:
+        kind = next(kind for kind in PICTURES if isinstance(shown, kind))
+        if kind not in IN_SPACE or (quantity in pictures and quantity not in IN_SPACE[kind]):
+            scene.require_plane(f"plot of {quantity or next(iter(pictures))!r}")
+        pictures = IN_SPACE[kind]
     if quantity and quantity not in pictures:
         hint = "; a scene has none before a run" if isinstance(shown, Scene) else ""
         raise ArgumentError(
             f"plot: quantity = {quantity!r} of a {type(shown).__name__} is not one of "
             f"{', '.join(pictures)}{hint}"
         )
-    scene = shown if isinstance(shown, Scene) else getattr(shown, "scene", None)
-    if isinstance(scene, Scene):
-        scene.require_plane("plot")
     quantity = quantity or next(iter(pictures))
     draw = pictures[quantity]
     try:

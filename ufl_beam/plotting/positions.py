@@ -70,9 +70,8 @@ def segments(line: Array) -> Array:
 
 
 def joined(lines: Iterable[Array]) -> Array:
-    """Join lines with NaN between them, as one line for Matplotlib; (n, 2)."""
-    gap = np.full((1, 2), np.nan)
-    pieces: list[Array] = [piece for line in lines for piece in (line, gap)]
+    """Join lines with NaN between them, as one line for Matplotlib; (n, 2 or 3)."""
+    pieces: list[Array] = [x for line in lines for x in (line, np.nan * np.ones_like(line[:1]))]
     return np.concatenate(pieces[:-1] or [np.empty((0, 2))])
 
 
@@ -103,7 +102,7 @@ class Canvas:
     ) -> None:
         require_number(magnify, "magnify", positive=True)
         self.magnify, self.unit, self.outside, self.scale = magnify, unit, outside or unit, scale
-        self._solution = subject if isinstance(subject, States) else None
+        self.solution = subject if isinstance(subject, States) else None
         self.scene = subject.scene if isinstance(subject, States) else subject
         self.shown = shown
         self.spots = attachment_points(self.scene)  # attachment points of bodies and of the ground
@@ -124,19 +123,19 @@ class Canvas:
     @property
     def undeformed(self) -> DeformedShape:
         """Shape of the undeformed scene."""
-        if self._solution is not None:
-            nodes = self._solution.numbering.points
+        if self.solution is not None:
+            nodes = self.solution.numbering.points
         else:
             vertices = ([b.curve(s) for s in b.vertices(())] for b in self.scene.beams)
-            nodes = np.concatenate([np.empty((0, 2)), *vertices])
-        return DeformedShape(self, lambda place: np.zeros(3), nodes)
+            nodes = np.concatenate([np.empty((0, 3 if self.scene.in_space else 2)), *vertices])
+        return DeformedShape(self, lambda place: np.zeros(6 if self.scene.in_space else 3), nodes)
 
     def shape(self, n: int) -> DeformedShape:
         """Return the shape at the n-th recorded time of the solution, or raise ArgumentError."""
-        assert self._solution is not None
+        assert self.solution is not None
         require_kind(n, (int, np.integer), "plot: n")
-        numbering, n = self._solution.numbering, self._solution.index(n)
-        state = self._solution.subset(n, n + 1)
+        numbering, n = self.solution.numbering, self.solution.index(n)
+        state = self.solution.subset(n, n + 1)
         moved = state.q[0, numbering.dofs[:, : numbering.displacements]]
         nodes = numbering.points + self.magnify * moved
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
@@ -164,7 +163,7 @@ class Canvas:
         units at ends where the curve goes on.
         """
         ranges: dict[Connector, Range] = {}
-        solution, shown = self._solution, list(self.shown)
+        solution, shown = self.solution, list(self.shown)
         for holder in (holder for joint in self.scene.joints for holder in joint.holders):
             if isinstance(holder.law, Guide):
                 ranges[holder] = self._along_guide(holder, holder.law)
@@ -182,7 +181,7 @@ class Canvas:
     def _along_guide(self, holder: Connector, law: Guide) -> Range:
         """Return the used parameters of a guide curve, with extensions where the curve goes on."""
         curve, size, parameters = law.curve, self.scene.size, [0.0]
-        for point in () if self._solution is None else self._solution.position(holder.b):
+        for point in () if self.solution is None else self.solution.position(holder.b):
             parameters.append(curve.nearest(point, parameters[-1], size))
         used = [0.0, *(parameters[1:][n] for n in self.shown)]
         ends = []

@@ -277,9 +277,10 @@ def _frames(solids: Solids) -> Generator[Any, None, None]:
                 # Meshes and texts replace the old ones of the same name.
                 if beams:
                     plotter.add_mesh(
-                        solids.beams(n, shape, factor), scalars="values", clim=(-limit, limit),
-                        cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
-                        ambient=0.4, diffuse=0.7,
+                        solids.beams(n, shape, factor), scalars="values",
+                        clim=(0.0 if solids.magnitudes else -limit, limit),
+                        cmap="viridis" if solids.magnitudes else "coolwarm", name="beams",
+                        scalar_bar_args=bar, reset_camera=False, ambient=0.4, diffuse=0.7,
                     )  # fmt: skip
                     plotter.scalar_bars["values"].SetTitle("")  # VTK would draw it over the numbers
                 for color, meshes in solids.others(n, shape).items():
@@ -339,6 +340,11 @@ class Solids:
     def in_space(self) -> bool:
         """True if the scene is in space."""
         return self.solution.scene.in_space
+
+    @property
+    def magnitudes(self) -> bool:
+        """True if colours show magnitudes, from zero on."""
+        return self.in_space and self.quantity in ("V", "M")
 
     @property
     def quantities(self) -> dict[str, tuple[str, str]]:

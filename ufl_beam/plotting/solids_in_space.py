@@ -36,10 +36,10 @@ RESULTANTS = {
 
 def values_in_space(solution: States, quantity: str, n: int) -> Array:
     """Return the values that colours show at both ends of all cells; (num_cells, 2)."""
-    forces = solution.forces_in_middle(n).T
-    both = {"N": forces[:1], "V": forces[1:3], "T": forces[3:4], "M": forces[4:]}[quantity]
-    values = both[0] if len(both) == 1 else np.linalg.norm(both, axis=0)
-    return np.repeat(values[:, None], 2, axis=1)
+    forces = solution.cell_forces(n, np.array([0.0, 1.0]))
+    columns = {"N": [0], "V": [1, 2], "T": [3], "M": [4, 5]}[quantity]
+    some = forces[:, :, columns]
+    return np.asarray(some[:, :, 0] if len(columns) == 1 else np.linalg.norm(some, axis=2))
 
 
 def points_in_space(shape: DeformedShape) -> Array:

@@ -152,13 +152,15 @@ def png(figure: Figure) -> tuple[bytes, dict[str, int]]:
 
 
 @contextmanager
-def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
+def panel(
+    ax: Axes | None, size: tuple[float, float], projection: str | None = None
+) -> Iterator[Axes]:
     """Open axes of a new :func:`picture`, or the user's axes ``ax``, which keep their size."""
     import matplotlib as mpl
 
     if ax is None:
         with picture(size) as figure:
-            yield figure.add_subplot()
+            yield figure.add_subplot(projection=projection)
         return
     with mpl.rc_context(_unless_chosen(STYLE)):
         yield ax
