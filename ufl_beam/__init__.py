@@ -81,6 +81,7 @@ from ufl_beam.model.fibres import Fibres
 from ufl_beam.model.functions import Spline, Table, ramp
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
+    Cylindrical,
     Guided,
     Link,
     Prismatic,
@@ -89,6 +90,7 @@ from ufl_beam.model.joints import (
     Rigid,
     RigidLink,
     Spherical,
+    Universal,
 )
 from ufl_beam.model.loads import (
     FollowerLoad,
@@ -147,6 +149,7 @@ __all__ = [
     "Controller",
     "ConvergenceError",
     "Coulomb",
+    "Cylindrical",
     "Damper",
     "DisplacementControl",
     "DissipationControl",
@@ -211,6 +214,7 @@ __all__ = [
     "Support",
     "Table",
     "Turn",
+    "Universal",
     "Velocity",
     "VirtualWork",
     "animate",

@@ -36,7 +36,8 @@ NAMES = {"name", "depth", "shape"}
 """Fields that are for messages, pictures and section tables."""
 
 IN_SPACE = {
-    "Spherical", "Beam.up", "Revolute.axis", "Turn.axis", "Section.centroid_only",
+    "Spherical", "Universal", "Cylindrical", "Beam.up", "Revolute.axis", "Turn.axis",
+    "Section.centroid_only",
 }  # fmt: skip
 """Effects and options of scenes in space; the stored scenes are in the plane."""
 

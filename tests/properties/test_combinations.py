@@ -67,7 +67,7 @@ ELSEWHERE = {
     "derivatives of runs, with random combinations of their own": "differentiate gradient",
     "many runs": "Measurement calibrate study tradeoff",
     "other geometry of ordinary scenes": "imperfect",
-    "scenes in space, with tests of their own": "Spherical",
+    "scenes in space, with tests of their own": "Spherical Universal Cylindrical",
     "errors and words": "ConvergenceError ModelWarning ArgumentError ModelError print_once",
     "pictures of what is not in every combination, or slow": "Camera animate picture render",
 }

@@ -177,11 +177,11 @@ class OnConnector(Statement):
         relative = self._in_space if self.in_space else self._in_plane
         found, turned = relative(at, virtual)
         e0, e1, rates, variations = (list[Expr]() for _ in range(4))
-        for before, now, variation in found:
+        for before, now, variation, *rate in found:
             e0.append(at.stage(before))
-            nodal = self.unknowns[: -self.laws] if self.rates else ()
+            nodal = self.unknowns[: -self.laws] if self.rates and not rate else ()
             slopes = (ufl.diff(before, at[f"q0 {x}"]) * at[f"rate1 {x}"] for x in nodal)
-            rates.append(at.stage(sum(slopes, ufl.as_ufl(0.0))))
+            rates.append(at.stage(sum(slopes, *rate or [ufl.as_ufl(0.0)])))
             e1.append(at.stage(now))
             variations.append(variation)
         λ = [at[f"q1 force{k}"] for k in range(self.laws)]
@@ -214,19 +214,38 @@ class OnConnector(Statement):
         return found, {}
 
     def _in_space(self, at: Inputs, virtual: Any) -> tuple[list[tuple[Expr, ...]], dict[str, Expr]]:
-        """Return the same of motions in space; the state is the quaternions of the nodes."""
+        """Return the same of motions in space; the state is the quaternions of the nodes.
+
+        If the statement has rates, each motion also has its rate before the step, which is its
+        variation by the velocities in a step of zero.
+        """
         turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
         u = ([vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1"))
         a, b = [
             NodeInStep(before, now, turn, tuple(w[:3]), tuple(w[3:]), self.scheme)
             for before, now, turn, w in zip(*u, turns, virtual, strict=True)
         ]
+        at_rest = [
+            NodeInStep(
+                x.u0, x.u0, Turn(_same, (ufl.as_ufl(0.0),) * 3, x.turn.q0),
+                vector(at, "rate1", "xyz", k), vector(at, "rate1", "abc", k), self.scheme,
+            )
+            for k, x in enumerate((a, b) if self.rates else ())
+        ]  # fmt: skip
         found = list[tuple[Expr, ...]]()
         for k, motion in enumerate(self.motions):
             given = np.reshape([at[f"{name} {k}"] for name in PLACES_IN_SPACE], (-1, 3))
             geometry = GeometryInSpace(*map(tuple, given.tolist()))
-            found.append(SPATIAL_MOTIONS[motion](a, b, geometry, self.scheme))
+            moved = [*SPATIAL_MOTIONS[motion](a, b, geometry, self.scheme)]
+            if at_rest:
+                begun = at_rest[0], at_rest[1], geometry, self.scheme
+                moved.append(SPATIAL_MOTIONS[motion](*begun)[2])
+            found.append(tuple(moved))
         return found, new_state(turns)
+
+
+def _same(x: Expr) -> Expr:
+    return x
 
 
 @dataclass(frozen=True)

@@ -293,6 +293,11 @@ class Bushing(Connector):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if len(self.a.point) == 3:
+            raise ModelError(
+                f"{self}: bushings, and so clearances, are for scenes in the plane; in space join "
+                "the places by Slide or Turn with an axis, one for each component"
+            )
         object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Bushing"))
         require_kind(self.law, ConnectorLaw, f"{self}: law")
         if self.law.components == 1:

@@ -166,8 +166,10 @@ def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[objec
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether sticking friction makes constraints linearly dependent."""
-    friction = any(has_friction(connector.law) for connector in scene.all_connectors)
-    return friction and _dependences(scene, friction=True)[1].shape[1] > 0
+    friction = sum(has_friction(connector.law) for connector in scene.all_connectors)
+    if scene.in_space:  # constraints are not compared there
+        return friction > 1
+    return friction > 0 and _dependences(scene, friction=True)[1].shape[1] > 0
 
 
 def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:

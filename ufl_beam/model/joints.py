@@ -10,6 +10,8 @@ from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
@@ -35,6 +37,9 @@ from ufl_beam.model.connectors import (
 )
 from ufl_beam.model.functions import Curve, Point, guide_curve
 from ufl_beam.model.records import Instance, Record, Switch, Text
+
+PERPENDICULAR = 1e-9
+"""Largest cosine of the angle of two axes that are perpendicular."""
 
 
 class Joint(Bearing, Record, ABC):
@@ -95,6 +100,15 @@ class Joint(Bearing, Record, ABC):
         return Component(type(self).__name__, motion, a, b, RIGID, axis, corner, other=other)
 
 
+def _require_in_space(joint: Joint, instead: str) -> None:
+    """Raise :class:`ModelError` if a place of a joint is in the plane."""
+    places = getattr(joint, "places", vars(joint).values())
+    if any(len(getattr(x, "point", ())) == 2 for x in places):
+        raise ModelError(
+            f"{type(joint).__name__}: the joint is for scenes in space; use {instead} in the plane"
+        )
+
+
 class _AtPoint(Joint):
     """Joint at one point by shared unknowns or, with ``multipliers``, by connectors.
 
@@ -112,7 +126,7 @@ class _AtPoint(Joint):
         self.__post_init__()
 
     def directions(self) -> list[tuple[Any, ...]]:
-        """Return motions that hold directions, besides shared rotations."""
+        """Return motions that hold directions of the first place and of each other one."""
         return []
 
     def __post_init__(self) -> None:
@@ -131,11 +145,12 @@ class _AtPoint(Joint):
             pairs = zip(axes, [*axes[1:], axes[0]], strict=True)
             in_space: list[tuple[Any, ...]] = [("aligning", axis, other) for axis, other in pairs]
             motions += in_space if len(axes) == 3 else [("turning", axes[0])]
-        held = ((x, [*motions * (x in moving), *self.directions()]) for x in self.places)
+        held = [(base, x, some) for x in moving if x != base for some in motions]
+        held += [(self.places[0], x, some) for x in self.places[1:] for some in self.directions()]
         holders = tuple(
-            Component(kind, motion, base, place, RIGID, axis, other=tuple(*other))
-            for place, some in held if place != base for motion, axis, *other in some
-        )  # fmt: skip
+            Component(kind, motion, a, b, RIGID, axis, other=tuple(*other))
+            for a, b, (motion, axis, *other) in held
+        )
         vars(self).update(shared=shared, holders=holders)
 
 
@@ -226,13 +241,86 @@ class Spherical(_AtPoint):
     multipliers: Switch
 
     def __post_init__(self) -> None:
-        if any(len(getattr(x, "point", ())) == 2 for x in self.places):
-            raise ModelError(f"{self}: ball joints are in space; use Revolute in the plane")
+        _require_in_space(self, "Revolute")
         super().__post_init__()
 
 
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Universal(_AtPoint):
+    """Universal joint in space: a cross whose arms are pinned to ``a`` and to ``b``.
+
+    Both places share the displacement.  They do not turn relative to each other about the normal of
+    both ``axes``.
+
+    Args:
+        a: Place in which the first axis is fixed.
+        b: Place in which the second axis is fixed.
+        axes: Two perpendicular directions in the undeformed scene, along the arms of the cross.
+        multipliers: As in :class:`Rigid`.
+
+    Raises:
+        ModelError: In the plane, or for axes that are not perpendicular.
+
+    Example:
+        >>> tube = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
+        >>> drive = ub.Beam((0, 0, 0), (1, 0, 0), tube, name="drive")
+        >>> driven = ub.Beam((1, 0, 0), (2, 0.5, 0), tube, name="driven")
+        >>> print(ub.Universal(drive.end, driven.start, axes=((0, 1, 0), (0, 0, 1))))
+        Universal(drive.end (1, 0, 0), driven.start (1, 0, 0))
+    """
+
+    places: tuple[AttachmentPoint, ...]
+    multipliers: Switch
+    axes: Any
+
+    def __init__(
+        self, a: AttachmentPoint, b: AttachmentPoint, *, axes: Sequence[Sequence[float]],
+        multipliers: bool = False,
+    ) -> None:  # fmt: skip
+        vars(self).update(places=(a, b), multipliers=multipliers, axes=axes)
+        self.__post_init__()
+
+    def __post_init__(self) -> None:
+        _require_in_space(self, "Revolute")
+        if np.ndim(self.axes) != 2 or len(self.axes) != 2:
+            raise ModelError(f"{self}: axes = {self.axes} must be two directions (x, y, z)")
+        a, b = self.places
+        first, second = (unit_axis(a, b, axis, "Universal") for axis in self.axes)
+        if abs(np.dot(first, second)) > PERPENDICULAR:
+            raise ModelError(f"{self}: axes = {self.axes} must be perpendicular to each other")
+        vars(self).update(axes=(first, second))
+        super().__post_init__()
+
+    def directions(self) -> list[tuple[Any, ...]]:
+        """See the base class: the axes stay perpendicular."""
+        return [("aligning", *self.axes)]
+
+
+class _OnRail(Joint):
+    """Joint whose ``slider`` moves along an axis that turns with the place ``rail``."""
+
+    rail: AttachmentPoint
+    slider: AttachmentPoint
+    axis: Any
+
+    @property
+    def turns(self) -> bool:
+        """True if the slider turns on the rail."""
+        return True
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        axis = unit_axis(self.rail, self.slider, self.axis, type(self).__name__)
+        vars(self).update(axis=axis, shared=() if self.turns else (2,))
+        normals: Any = across(axis) if len(axis) == 3 else ((-axis[1], axis[0]),)
+        holders = [self._hold("sliding", normal) for normal in normals]
+        if self.turns and len(axis) == 3:  # the slider turns about the axis only
+            holders += [self._hold("aligning", normal, other=axis) for normal in normals]
+        vars(self).update(holders=tuple(holders))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Prismatic(Joint):
+class Prismatic(_OnRail):
     """Prismatic joint: ``slider`` moves along an axis that turns with the place ``rail``.
 
     Args:
@@ -258,15 +346,38 @@ class Prismatic(Joint):
     axis: Point | None = None
     turning: Switch = False
 
+    @property
+    def turns(self) -> bool:
+        """See the base class."""
+        return self.turning
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Cylindrical(_OnRail):
+    """Cylindrical joint in space: ``slider`` moves along an axis of ``rail``, and turns about it.
+
+    Args:
+        rail: Place with which the axis turns; it may be on the ground.
+        slider: Place that slides and turns.
+        axis: Direction in the undeformed scene; from rail to slider by default.
+
+    Raises:
+        ModelError: An axis of zero length, or places in the plane.
+
+    Example:
+        >>> collar = ub.Body((0, 0, 1), mass=2.0, inertia=(0.1, 0.1, 0.1), name="collar")
+        >>> print(ub.Cylindrical(ub.ground(0, 0, 0), collar.middle))
+        Cylindrical(ground (0, 0, 0), collar (0, 0, 1))
+    """
+
+    rail: PlaceField
+    slider: PlaceField
+    _: KW_ONLY
+    axis: Point | None = None
+
     def __post_init__(self) -> None:
+        _require_in_space(self, "Prismatic(turning=True)")
         super().__post_init__()
-        axis = unit_axis(self.rail, self.slider, self.axis, "Prismatic")
-        vars(self).update(axis=axis, shared=() if self.turning else (2,))
-        normals: Any = across(axis) if len(axis) == 3 else ((-axis[1], axis[0]),)
-        holders = [self._hold("sliding", normal) for normal in normals]
-        if self.turning and len(axis) == 3:  # the slider turns about the axis only
-            holders += [self._hold("aligning", normal, other=axis) for normal in normals]
-        vars(self).update(holders=tuple(holders))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

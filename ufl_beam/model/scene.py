@@ -31,7 +31,7 @@ from ufl_beam.model.bodies import (
     node,
 )
 from ufl_beam.model.checks import require_all
-from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic, has_friction
+from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic
 from ufl_beam.model.connectors import (
     Component,
     Connector,
@@ -44,6 +44,7 @@ from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.joints import (
+    Cylindrical,
     Joint,
     Link,
     Prismatic,
@@ -51,6 +52,7 @@ from ufl_beam.model.joints import (
     Rigid,
     RigidLink,
     Spherical,
+    Universal,
 )
 from ufl_beam.model.loads import (
     LOADS,
@@ -79,8 +81,9 @@ class Scene(Record, Rich):
 
     Args:
         beams: The beams.
-        joints: :class:`Rigid`, :class:`Revolute`, :class:`Spherical`, :class:`Prismatic`,
-            :class:`RigidLink`, :class:`Link`, :class:`Guided`, :class:`Release`.
+        joints: :class:`Rigid`, :class:`Revolute`, :class:`Prismatic`, :class:`RigidLink`,
+            :class:`Link`, :class:`Guided`, :class:`Release`; in space also :class:`Spherical`,
+            :class:`Universal`, :class:`Cylindrical`.
         supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
             :class:`PrescribedDisplacement`.
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Pressure`,
@@ -398,7 +401,8 @@ class Scene(Record, Rich):
 
 
 IN_SPACE = (
-    Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
+    Beam, Body, Rigid, Revolute, Spherical, Universal, Prismatic, Cylindrical, RigidLink, Link,
+    Turn, Stretch, Slide,
     Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
@@ -415,7 +419,7 @@ def require_space(scene: Scene) -> None:
                 f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
             )
         law = getattr(record, "law", None)
-        if has_friction(law) or isinstance(law, RigidPlastic):
+        if isinstance(law, RigidPlastic):
             raise ModelError(
                 f"{record._label()}: {type(law).__name__} is a law for scenes in the plane"
             )

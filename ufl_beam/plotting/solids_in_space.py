@@ -102,7 +102,7 @@ def others_in_space(shape: DeformedShape) -> dict[str, list[Any]]:
             at, height = shape.at(place), 2.0 * unit
             pin = Cylinder(center=at, direction=turned, radius=height / 4, height=height)
             meshes[PIN].append(pin.triangulate())
-        elif joint.meets and len(joint.holders) == 3:
+        elif joint.meets and 2 not in joint.shared:
             meshes[PIN].append(ball(place, 0.6))
     for support in scene.supports:
         lengths = dict.fromkeys(("x_length", "y_length", "z_length"), 1.6 * unit)

@@ -133,12 +133,11 @@ def _draw_scene(axes: Any, shape: DeformedShape, unit: float, color: str = INK) 
     pins, blocks, axles = list[Array](), list[Array](), list[Array]()
     for joint in scene.joints:
         place = joint.places[-1]
-        if (axis := getattr(joint, "axis", None)) is not None:
-            at = shape.at(place)
-            axes_of_joint = [axis, *([other] if (other := getattr(joint, "other", None)) else [])]
-            for k, x in enumerate(axes_of_joint):
-                turned = Rotation.from_rotvec(shape.motion(joint.places[k])[3:]).apply(x)
-                axles.append(np.array([at - 2 * unit * turned, at + 2 * unit * turned]))
+        axis = getattr(joint, "axis", None)
+        own_axes = getattr(joint, "axes", [axis] * (axis is not None))
+        for base, x in zip(joint.places, own_axes, strict=False):
+            turned = 2 * unit * Rotation.from_rotvec(shape.motion(base)[3:]).apply(x)
+            axles.append(shape.at(place) + np.array([-turned, turned]))
         if joint.meets and 2 not in joint.shared:
             pins.append(shape.at(place))
         elif not joint.meets and axis is not None:  # a slider on a rail

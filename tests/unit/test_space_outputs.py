@@ -1,0 +1,386 @@
+# SPDX-License-Identifier: MIT
+"""Scenes in space: section forces, extremes, pictures, further joints, friction."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from test_space import KINDS, OTHER, STIFF, TURNS, in_plane, in_space, same_motion
+
+import ufl_beam as ub
+
+SECTION = ub.Section(**STIFF, **OTHER)
+EXACT = ub.Newton(rtol=1e-13)
+RUN = {"newton": EXACT, "progress": False}
+SKEW = Rotation.from_rotvec([0.3, -0.7, 1.1])
+
+
+def skew(*vector):
+    return tuple(SKEW.apply(vector))
+
+
+# -- friction --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("kind", "limit"), [("Stretch", 10.0), ("Slide", 5.0), ("Turn", 30.0)])
+def test_friction_is_the_same_in_space(kind, limit):
+    """It sticks and slips as in the plane; Stretch and Slide also turn back."""
+    scenes = [
+        make(connectors=lambda *x: [KINDS[kind](*x, ub.Coulomb(limit))])
+        for make in (in_plane, lambda **more: in_space(TURNS[1], **more))
+    ]
+    runs = same_motion(*scenes, ub.EnergyMomentum(), TURNS[1])
+    one, other = (run.connector(run.scene.connectors[0]) for run in runs)
+    for name in ("motion", "force", "work"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert np.abs(a - b).max() < 1e-9 * max(1.0, np.abs(a).max())
+    slips = np.abs(np.abs(other.force[1:]) - limit) < 1e-9 * limit
+    assert slips.any()
+    assert not slips.all()
+
+
+def wheel(moment, spin):
+    """A wheel in a bearing about a skew axis, with dry friction."""
+    turn, axis = SKEW.as_matrix(), skew(1, 0, 0)
+    body = ub.Body(skew(2, 1, 0), mass=3.0, inertia=turn @ np.diag([0.4, 0.3, 0.3]) @ turn.T)
+    bearing = ub.ground(*body.center)
+    return ub.Scene(
+        bodies=[body], joints=[ub.Revolute(bearing, body.middle, axis=axis)],
+        connectors=[ub.Turn(bearing, body.middle, ub.Coulomb(moment), axis=axis)],
+        initial=[ub.Velocity([body], angular=tuple(spin * np.array(axis)), linear=(0, 0, 0),
+                             about=body.center)],
+    )  # fmt: skip
+
+
+def test_a_bearing_brakes_a_wheel():
+    """The speed falls by moment / inertia, and at rest the friction has the kinetic energy."""
+    scene = wheel(0.05, 0.5)  # 4 s to rest, 1 rad
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 5), dt=0.02, **RUN)
+    speed = run.velocity(scene.bodies[0].middle)[:, 3:] @ skew(1, 0, 0)
+    exact = np.maximum(0.5 - 0.05 / 0.4 * run.times, 0.0)
+    assert np.abs(speed - exact).max() < 1e-4 * 0.5  # the moment works on angles: (ω dt)²/12
+    assert run.energy.lost["friction"][-1] == pytest.approx(0.4 * 0.5**2 / 2, rel=1e-9)
+    assert run.energy.worst < 1e-12
+    rest = run.displacement(scene.bodies[0].middle)[-10:, 3:]
+    assert np.ptp(rest, axis=0).max() < 1e-12
+
+
+def test_friction_by_the_force_of_a_joint():
+    """A block slides on a skew rail: its acceleration has the coefficient times the normal force.
+
+    The limit of a step has the force of the step before, so that friction begins with the second.
+    """
+    axis, g, coefficient = np.array(skew(0.6, 0.0, -0.8)), np.array(skew(0, 0, -9.81)), 0.3
+    block = ub.Body((1, 2, 3), mass=2.0, inertia=(0.1, 0.1, 0.1))
+    rail = ub.Prismatic(ub.ground(1, 2, 3), block.middle, axis=tuple(axis))
+    law = ub.Coulomb(coefficient=coefficient, joint=rail)
+    scene = ub.Scene(
+        bodies=[block], joints=[rail], loads=[ub.Gravity(tuple(g))],
+        connectors=[ub.Slide(ub.ground(1, 2, 3), block.middle, law, axis=tuple(axis))],
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, **RUN)
+    speed = run.velocity(block.middle)[:, :3] @ axis
+    down, normal = g @ axis, np.linalg.norm(np.cross(g, axis))
+    assert np.abs(np.diff(speed)[1:] / 0.1 - (down - coefficient * normal)).max() < 1e-10
+    assert np.abs(np.cross(run.position(block.middle) - [1, 2, 3], axis)).max() < 1e-12
+
+
+# -- joints ----------------------------------------------------------------------------------------
+
+
+def shafts(bend):
+    """Two shafts with a universal joint; the first is driven, the second is held in its line."""
+    along = np.array([math.cos(bend), math.sin(bend), 0.0])
+    first = ub.Body(skew(-1, 0, 0), mass=1.0, inertia=(1, 1, 1), name="first")
+    second = ub.Body(skew(*along), mass=1.0, inertia=(1, 1, 1), name="second")
+    far = second.at(*skew(*(2 * along)))
+    cross = ub.Universal(first.at(0, 0, 0), second.at(0, 0, 0), axes=(skew(0, 1, 0), skew(0, 0, 1)))
+    bearing = ub.ground(*first.center)
+    drive = ub.PrescribedMotion(lambda t: 2.0 * t)
+    held = [
+        ub.Slide(ub.ground(*far.point), far, ub.PrescribedMotion(lambda t: 0.0), axis=axis)
+        for axis in (skew(0, 0, 1), skew(-along[1], along[0], 0))
+    ]
+    return ub.Scene(
+        bodies=[first, second],
+        joints=[ub.Revolute(bearing, first.middle, axis=skew(1, 0, 0)), cross],
+        connectors=[ub.Turn(bearing, first.middle, drive, axis=skew(1, 0, 0)), *held],
+    )  # fmt: skip
+
+
+def test_angles_of_a_universal_joint():
+    """Hooke's joint, whose first arm begins in the plane of the bend: tan a = tan b cos(bend)."""
+    bend = 0.6
+    scene = shafts(bend)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, **RUN)
+    first, second = (run.displacement(body.middle)[:, 3:] for body in scene.bodies)
+    line = np.array(skew(math.cos(bend), math.sin(bend), 0))
+    turned = first @ skew(1, 0, 0), second @ line
+    assert np.abs(turned[0] - 2.0 * run.times).max() < 1e-10
+    exact = np.unwrap(np.arctan2(np.sin(turned[0]), np.cos(turned[0]) * math.cos(bend)))
+    assert np.abs(turned[1] - exact).max() < 1e-10
+    assert np.abs(np.cross(second, line)).max() < 1e-10
+
+
+def collar(joint):
+    body = ub.Body((1, 2, 3), mass=2.0, inertia=(0.1, 0.1, 0.1))
+    axis = np.array(skew(0, 0, 1))
+    spin = ub.Velocity([body], angular=tuple(4 * axis), linear=tuple(0.5 * axis), about=body.center)
+    return ub.Scene(
+        bodies=[body], joints=[joint(ub.ground(1, 2, 3), body.middle, axis=tuple(axis))],
+        loads=[ub.Gravity((0, 0, -9.81))], initial=[spin],
+    )  # fmt: skip
+
+
+def test_a_cylindrical_joint():
+    """A collar falls along its skew axis and spins: exact at any length of steps."""
+    axis = np.array(skew(0, 0, 1))
+    runs = [
+        ub.simulate(collar(joint), ub.EnergyMomentum(), t=(0, 1), dt=0.1, **RUN)
+        for joint in (
+            ub.Cylindrical, lambda *places, **more: ub.Prismatic(*places, turning=True, **more)
+        )
+    ]  # fmt: skip
+    assert (runs[0].q == runs[1].q).all()
+    run, t = runs[0], runs[0].times
+    moved = run.displacement(run.scene.bodies[0].middle)
+    fall = 0.5 * t - 9.81 * axis[2] * t**2 / 2
+    assert np.abs(moved[:, :3] - fall[:, None] * axis).max() < 1e-12
+    per_step = 2 * math.atan(4 * 0.1 / 2)
+    turns = Rotation.from_rotvec(per_step * np.arange(11)[:, None] * axis).as_rotvec()
+    assert np.abs(moved[:, 3:] - turns).max() < 1e-12
+    assert "Cylindrical(ground" in str(run.scene.joints[0])
+
+
+def machine():
+    """A bent drive on beams: universal and cylindrical joints, friction, a spring, gravity."""
+    arm = ub.Beam((0, 0, 0), (2, 1, 0), SECTION, cells=3, name="arm")
+    wheel = ub.Body((2.5, 1, 0.3), mass=2.0, inertia=(1, 1, 1.5), name="wheel")
+    slider = ub.Body((2.5, 1, 1.3), mass=1.0, inertia=(0.2, 0.2, 0.1), name="slider")
+    rail = ub.Cylindrical(wheel.middle, slider.middle)
+    return ub.Scene(
+        [arm], bodies=[wheel, slider], supports=[ub.Clamped(arm.start)],
+        joints=[ub.Universal(arm.end, wheel.at(2, 1, 0), axes=((0, 1, 0), (0, 0, 1))), rail],
+        connectors=[
+            ub.Slide(wheel.middle, slider.middle, ub.Coulomb(coefficient=0.1, joint=rail)),
+            ub.Turn(wheel.middle, slider.middle, ub.Coulomb(0.3), axis=(0, 0, 1)),
+            ub.Stretch(wheel.at(2.6, 1, 0.4), ub.ground(3, 0, 2), ub.Spring(100.0)),
+        ],
+        loads=[ub.Gravity((0, 0, -9.81))],
+    )  # fmt: skip
+
+
+def test_a_machine_of_joints_with_friction():
+    """The ledger closes, the joints hold, and a run with start= continues it."""
+    scene = machine()
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02, **RUN)
+    assert run.energy.worst < 1e-11
+    assert run.energy.lost["friction"][-1] > 0.01
+    cross, rail = scene.joints
+    own, other = (
+        Rotation.from_rotvec(run.displacement(place)[:, 3:]).apply(axis)
+        for place, axis in zip(cross.places, cross.axes, strict=True)
+    )
+    assert np.abs(np.sum(own * other, axis=1)).max() < 1e-11
+    assert np.abs(run.position(cross.places[0]) - run.position(cross.places[1])).max() < 1e-11
+    along = Rotation.from_rotvec(run.displacement(rail.rail)[:, 3:]).apply(rail.axis)
+    between = run.position(rail.slider) - run.position(rail.rail)
+    assert np.abs(np.cross(between, along)).max() < 1e-11
+    assert np.ptp(np.linalg.norm(between, axis=1)) > 0.1
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, **RUN)
+    second = ub.simulate(scene, ub.EnergyMomentum(), t=(0.5, 1), dt=0.02, start=first, **RUN)
+    assert np.abs(second.q[-1] - run.q[-1]).max() < 1e-9 * np.abs(run.q[-1]).max()
+
+
+def test_momenta_of_a_flying_universal_joint():
+    """Two bodies with a universal joint: energy and momenta are constant."""
+    first = ub.Body((0, 0, 0), mass=2.0, inertia=(1, 2, 2.5), name="first")
+    second = ub.Body((2, 0, 0), mass=1.0, inertia=(0.5, 0.7, 0.9), name="second")
+    cross = ub.Universal(first.at(1, 0, 0), second.at(1, 0, 0), axes=(skew(0, 1, 0), skew(0, 0, 1)))
+    start = ub.Velocity([first, second], linear=(1, 0, 2), angular=(0.3, 1.0, -0.5))
+    spin = 0.9 * np.array(skew(0, 1, 0))
+    more = np.array(start.angular) + spin
+    speed = start.at(1, 0, 0)[:3]
+    turning = ub.Velocity([second], linear=speed, angular=tuple(more), about=(1, 0, 0))
+    scene = ub.Scene(
+        bodies=[first, second], joints=[cross],
+        initial=[ub.Velocity([first], linear=(1, 0, 2), angular=(0.3, 1.0, -0.5)), turning],
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 20), dt=0.1, **RUN)
+    total, momentum = run.energy.total, run.momentum()
+    assert np.ptp(total) < 1e-12 * total[0]
+    assert np.ptp(momentum, axis=0).max() < 1e-11 * np.abs(momentum).max()
+    axes = [
+        Rotation.from_rotvec(run.displacement(place)[:, 3:]).apply(axis)
+        for place, axis in zip(cross.places, cross.axes, strict=True)
+    ]
+    assert np.abs(np.sum(axes[0] * axes[1], axis=1)).max() < 1e-12
+
+
+class Interrupted(RuntimeError):
+    pass
+
+
+def test_a_checkpoint_changes_no_bit(shared_path):
+    """Also of extremes, which continue."""
+    scene, path = machine(), shared_path / "machine.checkpoint"
+
+    def run(record, until=None):
+        return ub.simulate(
+            scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.02, record=record,
+            until=until, checkpoint=ub.Checkpoint(path, every=5), **RUN,
+        )  # fmt: skip
+
+    def stop(now):
+        if now.t > 0.3:
+            raise Interrupted
+        return False
+
+    whole = ub.Extremes(accelerations=True)
+    plain = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.02, record=whole, **RUN)
+    with pytest.raises(Interrupted):
+        run(ub.Extremes(accelerations=True), stop)
+    continued = ub.Extremes(accelerations=True)
+    again = run(continued)
+    assert (again.q == plain.q).all()
+    (arm,) = scene.beams
+    for one, other in (
+        (whole.section_forces(arm), continued.section_forces(arm)),
+        (whole.displacement(scene.bodies[0]), continued.displacement(scene.bodies[0])),
+        (whole.acceleration(arm), continued.acceleration(arm)),
+    ):
+        assert all((a == b).all() for a, b in zip(one, other, strict=True))
+
+
+A, B = ub.Beam((0, 0, 0), (1, 0, 0), SECTION), ub.Beam((1, 0, 0), (1, 1, 0), SECTION)
+PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
+WRONG = {
+    "not perpendicular": (
+        lambda: ub.Universal(A.end, B.start, axes=((0, 1, 0), (0, 1, 1))), "must be perpendicular",
+    ),
+    "one axis": (lambda: ub.Universal(A.end, B.start, axes=(0, 1, 0)), "must be two directions"),
+    "universal in the plane": (
+        lambda: ub.Universal(PLANAR.end, ub.ground(1, 0), axes=((1, 0), (0, 1))), "use Revolute",
+    ),
+    "cylindrical in the plane": (
+        lambda: ub.Cylindrical(ub.ground(0, 0), PLANAR.end), "use Prismatic(turning=True)",
+    ),
+    "clearance": (
+        lambda: ub.Bushing(ub.ground(1, 0, 0), A.end, ub.Clearance(1e6, gap=1e-3)),
+        "bushings, and so clearances, are for scenes in the plane",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_errors_before_a_run(case):
+    make, words = WRONG[case]
+    with pytest.raises(ub.ModelError, match=re.escape(words)):
+        make()
+
+
+# -- section forces and extremes -------------------------------------------------------------------
+
+
+def bent(cells=(4, 3)):
+    """A bent cantilever with a tip force, a line load and gravity, which turns far."""
+    root = ub.Beam((0, 0, 0), (2, 1, 0.5), SECTION, cells=cells[0], up=(0.1, 0, 1), name="root")
+    tip = ub.Beam((2, 1, 0.5), (2, 2, 1.5), SECTION, cells=cells[1], name="tip")
+    return ub.Scene(
+        [root, tip], joints=[ub.Rigid(root.end, tip.start)], supports=[ub.Clamped(root.start)],
+        loads=[
+            ub.PointLoad(tip.end, force=(100, 80, -150), amplitude=lambda t: t),
+            ub.LineLoad(root, force=(5, 20, -30)), ub.Gravity((0, 3, -9.81)),
+        ],
+    )  # fmt: skip
+
+
+def in_section(run, place, up, vector):
+    """Return a vector in axes of the section at the end of the run."""
+    beam = place.beam
+    ahead = np.subtract(beam.end.point, beam.start.point)
+    first = ahead / np.linalg.norm(ahead)
+    second = np.array(up) - first @ up * first
+    second /= np.linalg.norm(second)
+    axes = np.column_stack([first, second, np.cross(first, second)])
+    turned = Rotation.from_rotvec(run.displacement(place)[-1, 3:]).as_matrix() @ axes
+    return turned.T @ vector
+
+
+def test_section_forces_are_in_equilibrium():
+    """With the reaction, the load at the tip, and at each vertex; rotations are up to 1 rad."""
+    scene = bent()
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, **RUN)
+    (root, tip), (foot,) = scene.beams, scene.supports
+    reaction = run.reaction(foot)[-1]
+    own = np.hstack([in_section(run, root.start, root.up, x) for x in np.split(reaction, 2)])
+    size = np.abs(reaction).max()
+    assert np.abs(run.section_forces_at(root.start)[-1] + own).max() < 1e-10 * size
+    load = in_section(run, tip.end, tip.up, np.array([100, 80, -150.0]))
+    assert np.abs(run.section_forces_at(tip.end)[-1] - [*load, 0, 0, 0]).max() < 1e-10 * size
+    values = np.array(run.diagram(root, points=3)[1:]).T.reshape(4, 3, 6)
+    assert np.abs(values[1:, 0] - values[:-1, -1]).max() < 1e-10 * size
+    assert np.abs(run.displacement(tip.end)[-1, 3:]).max() > 0.9
+
+
+def test_section_forces_of_a_simple_beam():
+    """Under its weight: closed forms at all points, for small deflections."""
+    q, length = 9.81e-3, 3.0
+    beam = ub.Beam((0, 0, 0), (length, 0, 0), SECTION, cells=4)
+    scene = ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity((0, 1e-3, -9.81e-3))]
+    )
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, **RUN)
+    found = run.diagram(beam, points=5)
+    left = length * (1 - found.s)
+    assert np.abs(found.V2 + q * left).max() < 1e-5 * q * length
+    assert np.abs(found.V3 + 1e-3 * left).max() < 1e-5 * q * length
+    assert np.abs(found.M3 + q * left**2 / 2).max() < 1e-5 * q * length**2
+    assert np.abs(found.M2 - 1e-3 * left**2 / 2).max() < 1e-5 * q * length**2
+    assert max(np.abs(x).max() for x in (found.N, found.T)) < 1e-4 * q * length
+
+
+def test_section_forces_are_those_of_the_plane():
+    """A planar frame in space, in a turned plane: at all points of statics."""
+    runs = []
+    for turn in (None, SKEW):
+        at = (lambda x, y: (x, y)) if turn is None else (lambda x, y: skew(x, y, 0))
+        section = ub.Section(**STIFF, **({} if turn is None else OTHER))
+        up = [{} if turn is None else {"up": at(*x)} for x in ((0, 1), (-1, 0))]
+        girder = ub.Beam(at(0, 0), at(2, 0.3), section, cells=3, **up[0])
+        post = ub.Beam(at(2, 0.3), at(2.2, 2), section, cells=2, **up[1])
+        loads = [
+            ub.LineLoad(girder, force=at(10, -40)),
+            ub.PointLoad(post.end, force=at(60, -30), amplitude=lambda t: t),
+        ]
+        scene = ub.Scene(
+            [girder, post], joints=[ub.Rigid(girder.end, post.start)],
+            supports=[ub.Clamped(girder.start)], loads=loads,
+        )  # fmt: skip
+        runs.append(ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, **RUN))
+    for one, other in zip(*(run.scene.beams for run in runs), strict=True):
+        plane, space = runs[0].diagram(one), runs[1].diagram(other)
+        size = max(np.abs(x).max() for x in plane[1:])
+        for a, b in zip(plane[1:], (space.N, space.V2, space.M3), strict=True):
+            assert np.abs(a - b).max() < 1e-4 * size
+            assert np.abs(a - b)[[0, -1]].max() < 1e-10 * size
+        assert max(np.abs(x).max() for x in (space.V3, space.T, space.M2)) < 1e-10 * size
+
+
+def test_extremes_are_those_of_the_stored_states():
+    scene, extremes = machine(), ub.Extremes(points=3, accelerations=True)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, record=extremes, **RUN)
+    (arm,), (wheel, _) = scene.beams, scene.bodies
+    forces = np.array([np.array(run.diagram(arm, n, points=3)[1:]).T for n in range(len(run))])
+    found = extremes.section_forces(arm)
+    assert (found.low == forces.min(axis=0)).all()
+    assert (found.high == forces.max(axis=0)).all()
+    assert (found.time_high == run.times[forces.argmax(axis=0)]).all()
+    for owner, place in ((arm, arm.end), (wheel, wheel.middle)):
+        moved, some = run.displacement(place), extremes.displacement(owner)
+        assert np.abs(some.high[-1] - moved.max(axis=0)).max() < 1e-14
+        assert np.abs(some.low[-1] - moved.min(axis=0)).max() < 1e-14
+        rates = np.diff(run.velocity(place), axis=0) / 0.02
+        assert np.abs(extremes.acceleration(owner).high[-1] - rates.max(axis=0)).max() < 1e-9
