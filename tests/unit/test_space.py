@@ -458,10 +458,11 @@ WRONG = {
             bodies=[BALL], loads=[ub.PointLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
         ), "act at their centres",
     ),
-    "friction": (
+    "rigid-plastic law": (
         lambda: ub.Scene([BEAM], connectors=[
-            ub.Slide(ub.ground(1, 0, 0), BEAM.end, ub.Coulomb(1.0), axis=(0, 1, 0))
-        ]), "Coulomb is a law for scenes in the plane",
+            ub.Slide(ub.ground(1, 0, 0), BEAM.end, ub.RigidPlastic(ub.ElastoPlastic(1.0)),
+                     axis=(0, 1, 0))
+        ]), "RigidPlastic is a law for scenes in the plane",
     ),
     "planar support": (
         lambda: ub.Scene([BEAM], supports=[ub.Roller(BEAM.end)]), "Roller is for scenes",
@@ -499,13 +500,11 @@ def refused():
     run = ub.simulate(scene, **dynamic)
     control = ub.LoadControl(0.1)
     return {
-        "plot": lambda: ub.plot(run),
+        "plot": lambda: ub.plot(run, "damage"),
         "buckling": lambda: ub.buckling(scene, 1),
         "modes": lambda: ub.modes(scene, 1),
         "follow": lambda: ub.follow(scene, control, steps=1),
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
-        "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),
-        "section forces": lambda: run.section_forces_at(BEAM.end),
         "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.mesh,
     }

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: MIT
 """Scenes in space: section forces, extremes, pictures, further joints, friction."""
 
+import inspect
 import math
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 from scipy.spatial.transform import Rotation
 from test_space import KINDS, OTHER, STIFF, TURNS, in_plane, in_space, same_motion
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 SECTION = ub.Section(**STIFF, **OTHER)
 EXACT = ub.Newton(rtol=1e-13)
@@ -384,3 +389,236 @@ def test_extremes_are_those_of_the_stored_states():
         assert np.abs(some.low[-1] - moved.min(axis=0)).max() < 1e-14
         rates = np.diff(run.velocity(place), axis=0) / 0.02
         assert np.abs(extremes.acceleration(owner).high[-1] - rates.max(axis=0)).max() < 1e-9
+
+
+# -- analyses of structures ------------------------------------------------------------------------
+
+TUBE = st.steel("HSS8X4X1/4", E=200e9, nu=0.3, rho=7850.0)
+TOWER = ub.Beam((0, 0, 0), (0, 0, 6), TUBE, up=(1, 0, 0), name="tower")
+BASE = ub.Clamped(TOWER.start)
+FREE = ub.Scene([TOWER], supports=[BASE])
+WIND = ub.LineLoad(TOWER, force=(300.0, 400.0, 0.0))
+STATIC = {"t": (0, 1), "dt": 1.0, "progress": False}
+
+
+def blown():
+    scene = ub.Scene([TOWER], supports=[BASE], loads=[WIND])
+    return ub.simulate(scene, ub.Static(), **STATIC)
+
+
+def fatigue():
+    """A tower that sways in a skew direction: the stress of a corner follows both moments."""
+    spot = st.HotSpot.fibre(TOWER.start, y=0.1, z=-0.05, E=200e9)
+    record = st.Fatigue(spot, st.SNCurve.eurocode(71e6))
+    sway = ub.PointLoad(TOWER.end, force=(2e3, 1e3, 0), amplitude=lambda t: math.sin(t))
+    scene = ub.Scene([TOWER], supports=[BASE], loads=[sway])
+    run = ub.simulate(scene, ub.Static(), t=(0, 20), dt=0.2, record=record, progress=False)
+    forces = run.section_forces_at(TOWER.start)
+    own = spot.stress(*forces.T)
+    # Axis 2 is x, axis 3 is y: the foot has compression at x = 0.1 and tension at y = -0.05
+    exact = 6 * (0.05 * 1e3 / TUBE.EI2 - 0.1 * 2e3 / TUBE.EI) * 200e9 * np.sin(run.times)
+    assert np.abs(own - exact).max() < 1e-3 * np.abs(exact).max()
+    cycles = record.cycles(spot)
+    assert np.ptp(own) == pytest.approx(cycles.range.max(), rel=0.01)
+    assert record.life(spot) > 0
+
+
+def combinations():
+    """Statics is nearly linear: the envelope has the sums of closed forms, in both directions."""
+    push = {name: ub.PointLoad(TOWER.end, force=force) for name, force in (
+        ("x", (1e3, 0, 0)), ("y", (0, 2e3, 0))
+    )}  # fmt: skip
+    both = st.load_combinations(
+        FREE, {name: [load] for name, load in push.items()},
+        {"A": {"x": 1.5}, "B": {"x": -1.0, "y": 1.0}}, progress=False,
+    )  # fmt: skip
+    found = both.section_forces(TOWER)
+    M3, M2 = (found.high[0, 5], found.low[0, 5]), (found.high[0, 4], found.low[0, 4])
+    assert np.allclose(np.sort(np.abs(M3)), [6e3, 9e3], rtol=1e-3)
+    assert np.allclose(np.sort(np.abs(M2)), [0, 12e3], rtol=1e-3, atol=1.0)
+    assert both.reaction(BASE).low[0] == pytest.approx(-1.5e3, rel=1e-9)
+    assert "M3" in str(both)
+    assert (
+        ub.plot(both, "M3")
+        .axes[0]
+        .get_title("left")
+        .startswith("bending moment M3 (kN m), extremes")
+    )
+
+
+def drifts():
+    """Shears by equilibrium of the wind on the tower above a cut, along its direction."""
+    found = st.storeys(blown(), [TOWER.start, TOWER.at(0.5), TOWER.end], direction=(3, 4))
+    assert np.abs(found.shear[-1] - [500.0 * 6, 500.0 * 3]).max() < 1e-6
+    across = st.storeys(blown(), [TOWER.start, TOWER.end], direction=(-4, 3))
+    assert np.abs(across.shear[-1]).max() < 1e-6
+    moved = blown().displacement(TOWER.end)[-1, :2]
+    assert found.drift[-1].sum() == pytest.approx(moved @ (0.6, 0.8), rel=1e-12)
+    for words, more in (("in space give direction", {}), ("has no length", {"direction": (0, 0)})):
+        with pytest.raises(ub.ArgumentError, match=words):
+            st.storeys(blown(), [TOWER.start, TOWER.end], **more)
+
+
+def incremental():
+    """A stiff tower of one mass at its top: the drift is proportional to the motion."""
+    pulse = st.GroundMotion(0.02, np.sin(10 * np.arange(0, 0.4, 0.02)))
+
+    def build(motion):
+        shaking = ub.Gravity((-1, 0, 0), amplitude=motion.acceleration)
+        return ub.Scene([TOWER], supports=[BASE], loads=[shaking])
+
+    found = st.incremental_dynamic_analysis(
+        build, [pulse], [0.5, 1.0], limit=1.0, progress=False,
+        measure=lambda run: run.displacement(TOWER.end)[:, 0],
+    )  # fmt: skip
+    assert found.demand[0, 1] == pytest.approx(2 * found.demand[0, 0], rel=1e-3)
+
+
+def calibrated():
+    """The modulus from a deflection; derivatives are differences of runs in space."""
+
+    def model(E):
+        section = ub.Section(**{**STIFF, **OTHER, "EI": 1e3 * E})
+        beam = ub.Beam((0, 0, 0), (1, 0, 0), section, cells=2, name="arm")
+        load = ub.PointLoad(beam.end, force=(0, 0, 0.1))
+        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+
+    run = ub.simulate(model(0.7), ub.Static(), **STATIC)
+    tip = run.displacement(run.scene["arm"].end)[-1, 2]
+    measured = st.Measurement(
+        None,
+        [tip],
+        lambda run: run.displacement(run.scene["arm"].end)[-1:, 2],
+        scheme=ub.Static(),
+        t=(0, 1),
+        dt=1.0,
+        sigma=1e-9,
+    )
+    fit = st.calibrate(model, {"E": 1.0}, [measured], progress=False)
+    assert fit.parameters["E"] == pytest.approx(0.7, rel=1e-5)
+
+
+def refused(name):
+    def check():
+        calls = {
+            "pushover": lambda: st.pushover(FREE, TOWER.end, 0.1),
+            "response_spectrum_analysis": lambda: st.response_spectrum_analysis(
+                FREE, ([1e-4, 4.0], [3.0, 3.0]), n=1
+            ),
+            "hinge_table": lambda: st.hinge_table(blown()),
+            "imperfect": lambda: st.imperfect(FREE, sway=0.005),
+        }
+        with pytest.raises(ub.ModelError, match=f"{name}: only for scenes in the plane"):
+            calls[name]()
+
+    return check
+
+
+ANALYSES = {
+    "Fatigue": fatigue, "HotSpot": fatigue, "calibrate": calibrated,
+    "incremental_dynamic_analysis": incremental, "load_combinations": combinations,
+    "storeys": drifts,
+    **{x: refused(x) for x in (
+        "pushover", "response_spectrum_analysis", "hinge_table", "imperfect"
+    )},
+}  # fmt: skip
+TAKES = "Scene", "Solution", "Place", "HotSpot", "Model"
+"""Types of parameters that belong to scenes."""
+
+
+def test_the_table_has_all_analyses_of_scenes():
+    """All public names of `structures` whose parameters are scenes, runs or places."""
+    found = set()
+    for name in st.__all__:
+        parameters = inspect.signature(getattr(st, name)).parameters.values()
+        types = " ".join(str(x.annotation) for x in parameters)
+        if any(re.search(rf"\b{kind}\b", types) for kind in TAKES):
+            found.add(name)
+    assert found == set(ANALYSES)
+    page = (Path(__file__).parents[2] / "docs/space.md").read_text("utf-8")
+    table = page.partition("| of `structures`")[2].partition("\n\n")[0]
+    assert [name for name in st.__all__ if f"`{name}`" not in table] == []
+
+
+@pytest.mark.parametrize("name", ANALYSES)
+def test_analyses_of_structures(name):
+    ANALYSES[name]()
+
+
+# -- pictures --------------------------------------------------------------------------------------
+
+QUANTITIES = "shape", "N", "V", "T", "M", "V2", "V3", "M2", "M3"
+
+
+def drawn(figure):
+    """Labels of a picture, after it was drawn; no two cover each other."""
+    figure.draw_without_rendering()
+    (axes, *_) = figure.axes
+    labels = [x for x in axes.texts if x.get_gid() == "labels"]
+    boxes = [x.get_window_extent() for x in labels]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    return axes, [x.get_text() for x in labels]
+
+
+@pytest.mark.serial
+def test_pictures_of_section_forces():
+    """Labels are the values; the scale is the same along all axes, and z is up."""
+    run = ub.simulate(bent(), ub.Static(), t=(0, 1), dt=0.25, **RUN)
+    for quantity in QUANTITIES:
+        axes, labels = drawn(ub.plot(run, quantity))
+        size = np.ptp([getattr(axes, f"get_{x}lim")() for x in "xyz"], axis=1)
+        assert np.allclose(axes._box_aspect / size, (axes._box_aspect / size)[0])
+        up = [
+            axes.transData.transform(proj_transform(0, 0, z, axes.get_proj())[:2]) for z in (0, 1)
+        ]
+        assert up[1][1] > up[0][1]
+        assert abs(up[1][0] - up[0][0]) < 1e-6 * (up[1][1] - up[0][1])
+        if quantity != "shape":
+            assert labels
+    root = run.scene.beams[0]
+    M = run.section_forces_at(root.start)[-1, 4:]
+    assert f"{np.linalg.norm(M):.3g}" in drawn(ub.plot(run, "M"))[1]
+
+
+@pytest.mark.serial
+def test_other_pictures(tmp_path):
+    """Models with all joints, shapes, histories, extremes, notebooks, axes of a user."""
+    scene, extremes = machine(), ub.Extremes()
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=extremes, **RUN)
+    for shown, quantity, places, more in (
+        (scene, "", (), {}), (run, "", (), {"magnify": 5}), (run, "shapes", (), {"count": 3}),
+        (run, "history", (scene.beams[0].end,), {"component": "dw/dt"}),
+        (run, "history", (scene.beams[0].end,), {"component": "rx"}),
+        (run, "energy", (), {}), (run, "dissipation", (), {}), (extremes, "", (), {}),
+        (extremes, "T", (), {}),
+    ):  # fmt: skip
+        ub.plot(shown, quantity, *places, **more).savefig(tmp_path / "picture.png")
+    assert drawn(ub.plot(scene))[1]
+    assert "<img" in scene._repr_html_() + run._repr_html_()
+    figure = Figure()
+    assert ub.plot(scene, ax=figure.add_subplot(projection="3d")) is figure
+    with pytest.raises(ub.ArgumentError, match="needs axes in space"):
+        ub.plot(scene, ax=Figure().add_subplot())
+    with pytest.raises(ub.ModelError, match="'damage': only for scenes in the plane"):
+        ub.plot(run, "damage")
+    with pytest.raises(ub.ArgumentError, match="component = 'psi' is not one of"):
+        ub.plot(run, "history", scene.beams[0].end, component="psi")
+
+
+@pytest.mark.serial
+def test_magnitudes_are_coloured_from_zero(monkeypatch, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    scales, add = {}, pyvista.Plotter.add_mesh
+
+    def add_mesh(self, mesh, *args, clim=None, **more):
+        if clim is not None:
+            scales[quantity] = clim, mesh.point_data["values"]
+        return add(self, mesh, *args, clim=clim, **more)
+
+    monkeypatch.setattr(pyvista.Plotter, "add_mesh", add_mesh)
+    run = blown()
+    for quantity in "NVTM":
+        ub.render(run, tmp_path / "tower.png", quantity=quantity, size=(160, 96))
+        (low, high), values = scales[quantity]
+        assert low == (0.0 if quantity in "VM" else -high)
+    assert values.max() == pytest.approx(500 * 18 / 1e3, rel=1e-4)  # kN m at the foot

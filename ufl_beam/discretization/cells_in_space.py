@@ -104,7 +104,9 @@ class CellsOfState(NamedTuple):
         curvatures = self.frames(0.5).apply(self.between / self.lengths[:, None])
         return np.asarray(self.in_section(0.5, self.slopes, curvatures) - np.eye(6)[0])
 
-    def section_forces(self, fractions: Array, resultants: Array, along: Array) -> Array:
+    def section_forces(
+        self, fractions: Array, resultants: Array, along: Array, *, in_scene: bool = False
+    ) -> Array:
         """Return forces along, and moments about, axes 1, 2, 3 at fractions; (n, points, 6).
 
         At the ends they are the forces between cells and nodes, and in between they are in
@@ -114,6 +116,7 @@ class CellsOfState(NamedTuple):
             fractions: Fractions from 0 at the start to 1 at the end; (points,).
             resultants: Products of stiffnesses and :meth:`strains`; (n, 6); N, N m.
             along: Forces of loads along the cells on their nodes; (n, 2, 3); N.
+            in_scene: Take the axes x, y, z instead of the axes of the sections.
         """
         middle = self.frames(0.5)
         force, moment = (
@@ -134,7 +137,8 @@ class CellsOfState(NamedTuple):
             bubble = moment + (0.5 - s) * lever
             # Loads between the nodes: the integral of their levers, and linear to both ends
             change = (levers[1] - levers[0]) * (s - s**2) / 2
-            found.append(self.in_section(s, local, bubble + change))
+            both = local, bubble + change
+            found.append(np.hstack(both) if in_scene else self.in_section(s, *both))
         return np.stack(found, axis=1)
 
 

@@ -483,7 +483,7 @@ class States:
             self._computed = key, forces
         return self._computed[1]
 
-    def _in_cells_of_space(self, n: int, pieces: Array) -> Array:
+    def _in_cells_of_space(self, n: int, pieces: Array, in_scene: bool = False) -> Array:
         """Compute section forces of strains of a state, and of dead loads along cells."""
         fields, t = self.cells.fields, float(self._row("t", n))
         cells = CellsOfState.of(fields, self._row("q", n), self._row(TURNS, n))
@@ -495,7 +495,8 @@ class States:
                 along[some[0]] += factor * some[1].reshape(-1, 6, 2)
         stiffness = fields.section_values(*STIFFNESS_IN_SPACE)
         on_nodes = along[:, :3].transpose(0, 2, 1)
-        return cells.section_forces(pieces, stiffness * cells.strains(), on_nodes)
+        resultants = stiffness * cells.strains()
+        return cells.section_forces(pieces, resultants, on_nodes, in_scene=in_scene)
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
         """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m.
@@ -530,13 +531,14 @@ class States:
     ) -> Array:
         """Return (N, V, M) of :meth:`diagram` at a fraction of each of some cells; (n+1, m, 3).
 
-        With ``in_plane`` forces along x and y are returned instead of N and V.
+        With ``in_plane`` forces along x and y are returned instead of N and V; in space, forces
+        along and moments about x, y, z.
         """
         n, chosen = range(len(self)), np.array(cells, dtype=np.int64)
         if self.scene.in_space:
             pieces = np.array(fractions)
-            rows = (self.cell_forces(k, pieces)[chosen, range(len(chosen))] for k in n)
-            return np.array([*rows])
+            rows = (self._in_cells_of_space(k, pieces, in_plane) for k in n)
+            return np.array([row[chosen, range(len(chosen))] for row in rows])
         dofs, forces = self.cells.along.dofs[chosen], np.zeros((len(n), len(chosen), 3))
         q = np.array([self._in_equilibrium(k)[dofs] for k in n])
         resultants = np.array([self.cell_resultants(k)[:, chosen] for k in n])

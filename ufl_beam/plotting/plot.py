@@ -32,6 +32,7 @@ from ufl_beam.plotting.inelastic_pictures import (
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
 from ufl_beam.plotting.space_pictures import (
+    COMPONENTS,
     DIAGRAMS,
     draw_extremes_in_space,
     draw_shape_in_space,
@@ -76,10 +77,7 @@ IN_SPACE: dict[type, dict[str, Callable[..., Figure]]] = {
         "energy": draw_energy,
         "dissipation": draw_dissipation,
     },
-    Extremes: {
-        name: partial(draw_extremes_in_space, quantity=name)
-        for name in ("M3", "M2", "T", "N", "V2", "V3")
-    },
+    Extremes: {name: partial(draw_extremes_in_space, quantity=name) for name in COMPONENTS},
 }
 """The same of scenes in space; other pictures are refused."""
 

@@ -50,6 +50,9 @@ DIAGRAMS = {
 }  # fmt: skip
 """Words, columns of :class:`DiagramInSpace` after the first, and units of section forces."""
 
+COMPONENTS = "M3", "M2", "T", "N", "V2", "V3"
+"""Section forces whose envelopes are drawn."""
+
 ORDINATES = np.array(
     [[0, 1, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64
 )
@@ -235,12 +238,19 @@ def draw_extremes_in_space(
     extremes: Extremes, *, quantity: str = "M3", ax: Axes | None = None
 ) -> Figure:
     """Draw maxima and minima of a section force on the undeformed scene, as two diagrams."""
-    solution, columns = extremes.solution, DIAGRAMS[quantity][1]
-    found = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
-    diagrams = [(beam, x[:, columns]) for beam, some in found for x in (some.high, some.low)]
-    until = f"until {solution.parameter.at(solution.times[-1])}"
-    shape = Canvas(solution, 1.0, 1.0).undeformed
-    return _draw_frame(shape, f"extremes {until}", ax, quantity, diagrams)
+    solution = extremes.solution
+    title = f"extremes until {solution.parameter.at(solution.times[-1])}"
+    return draw_envelope_in_space(solution, extremes, title, quantity, ax)
+
+
+def draw_envelope_in_space(
+    solution: Solution, found: Any, title: str, quantity: str, ax: Axes | None
+) -> Figure:
+    """Draw the largest and the least values that ``found.section_forces(beam)`` has."""
+    columns, beams = DIAGRAMS[quantity][1], solution.scene.beams
+    extents = [(beam, found.section_forces(beam)) for beam in beams]
+    diagrams = [(beam, x[:, columns]) for beam, some in extents for x in (some.high, some.low)]
+    return _draw_frame(Canvas(solution, 1.0, 1.0).undeformed, title, ax, quantity, diagrams)
 
 
 def _draw_frame(

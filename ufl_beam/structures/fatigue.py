@@ -87,9 +87,7 @@ Life = Annotated[float, partial(require_number, positive=True, infinite=True)]
 MeanStress = Annotated[
     Callable[[Array, Array], Array], partial(require_function, arguments="(range, mean)")
 ]
-Stress = Annotated[
-    Callable[[Array, Array, Array], Array], partial(require_function, arguments="(N, V, M)")
-]
+Stress = Annotated[Callable[..., Array], partial(require_function, arguments="(N, V, M)")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,6 +276,7 @@ class HotSpot(Record):
     Args:
         place: Place on a beam.
         stress: Function (N, V, M) of section forces (N, N, N m) that returns stresses; (n,); Pa.
+            In space it is a function (N, V2, V3, T, M2, M3) in axes of the section.
 
     Raises:
         ArgumentError: ``place`` is no place, or ``stress`` is no function.
@@ -297,14 +296,19 @@ class HotSpot(Record):
     __repr__ = compact_repr
 
     @classmethod
-    def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
+    def fibre(
+        cls, place: Place, *, y: float, E: float, factor: float = 1.0, z: float | None = None
+    ) -> HotSpot:
         """Make a hot spot with the stress ``factor`` E (N/EA − y M/EI) of an elastic fibre.
+
+        In space the stress is ``factor`` E (N/EA − y M3/EI + z M2/EI2).
 
         Args:
             place: Place on a beam.
             y: Distance from the axis, positive to the left of the direction from start to end; m.
             E: Young's modulus; Pa.
             factor: Stress concentration factor: hot-spot stress over nominal stress.
+            z: In space, distance from the axis along axis 3 of the section, and y along axis 2; m.
         """
         require_kind(place, Place, "HotSpot: place")
         require_number(y, f"HotSpot {place}: y")
@@ -314,7 +318,15 @@ class HotSpot(Record):
         far = y / section.depth
         plausibility.check(f"HotSpot {place}", "distance from the axis over the depth", far)
         per_N, per_M = factor * E / section.EA, -factor * E * y / section.EI
-        return cls(place, lambda N, V, M: per_N * N + per_M * M)
+        if (z is None) != (len(place.point) == 2):
+            raise ArgumentError(
+                f"HotSpot {place}: in space give y and z; in the plane there is no z"
+            )
+        if z is None:
+            return cls(place, lambda N, V, M: per_N * N + per_M * M)
+        require_number(z, f"HotSpot {place}: z")
+        per_M2 = factor * E * z / section.EI2
+        return cls(place, lambda N, V2, V3, T, M2, M3: per_N * N + per_M * M3 + per_M2 * M2)
 
     def __str__(self) -> str:
         return str(self.place)
@@ -392,11 +404,11 @@ class Fatigue(Restartable):
             return
         forces, self._block = np.stack(self._block, axis=-1), []
         for k, spot in enumerate(self.spots):
-            N, V, M = (forces[k, i] for i in range(3))
-            stress = np.asarray(spot.stress(N, V, M), dtype=np.float64)
-            if stress.shape != N.shape or not np.isfinite(stress).all():
+            names = "N, V, M" if len(forces[k]) == 3 else "N, V2, V3, T, M2, M3"
+            stress = np.asarray(spot.stress(*forces[k]), dtype=np.float64)
+            if stress.shape != forces[k, 0].shape or not np.isfinite(stress).all():
                 raise ArgumentError(
-                    f"HotSpot {spot}: stress(N, V, M) must return a finite number for each N, V, M"
+                    f"HotSpot {spot}: stress({names}) must return a finite number for each {names}"
                 )
             self._counters[spot].add(stress)
 

@@ -56,6 +56,7 @@ def imperfect(
         0.128
     """
     require_kind(scene, Scene, "imperfect: scene")
+    scene.require_plane("imperfect")
     require_number(sway, "imperfect: sway")
     require_number(amplitude, "imperfect: amplitude")
     require_count(k, "imperfect: k", at_least=0)

@@ -14,11 +14,16 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import Rich, in_one_line
 from ufl_beam.errors import require_array
 from ufl_beam.model.bodies import AttachmentPoint, Member
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.simulation.solution import Solution
 
-UNITS = ("N", "kN"), ("V", "kN"), ("M", "kN m")
-"""Section forces with their units in texts; values in SI units are divided by 1000."""
+UNITS = {
+    3: (("N", "kN"), ("V", "kN"), ("M", "kN m")),
+    6: (("N", "kN"), ("V2", "kN"), ("V3", "kN"), ("T", "kN m"), ("M2", "kN m"), ("M3", "kN m")),
+}
+"""Section forces of the plane and of space with their units in texts, in which values in SI units
+are divided by 1000."""
 
 
 @in_one_line
@@ -70,6 +75,11 @@ class LoadCombinations(Rich):
     solutions: dict[str, Solution]
     failed: dict[str, str]
 
+    @property
+    def scene(self) -> Scene:
+        """Model, with the loads of the first combination that has an equilibrium."""
+        return next(iter(self.solutions.values())).scene
+
     def envelope(self, value: Callable[[Solution], npt.ArrayLike]) -> Governing:
         """Return extremes of a function of a solution, such as the drift of a storey.
 
@@ -93,6 +103,7 @@ class LoadCombinations(Rich):
     def section_forces(self, beam: Member, *, points: int = 9) -> Governing:
         """Return extremes of (N, V, M) at points of the cells of a beam; N, N, N m.
 
+        In space, they are of (N, V2, V3, T, M2, M3).
         Rows have the order of a :class:`Diagram` with the same points; (num_cells · points, 3).
 
         Raises:
@@ -118,7 +129,7 @@ class LoadCombinations(Rich):
         lines = [f"{repr(self)[1:-1]}; extremes of section forces and their combinations"]
         for beam in first.scene.beams:
             reached = self.section_forces(beam)
-            for k, (name, unit) in enumerate(UNITS):
+            for k, (name, unit) in enumerate(UNITS[reached.low.shape[1]]):
                 low, high = int(reached.low[:, k].argmin()), int(reached.high[:, k].argmax())
                 lines.append(
                     f"  {beam.name:12s} {name} {reached.low[low, k] / 1e3:10.2f} {unit:4s} "

@@ -17,7 +17,8 @@ from ufl_beam.plotting import notebook, style
 from ufl_beam.plotting.frame_pictures import draw_envelope
 from ufl_beam.plotting.history_pictures import bounds
 from ufl_beam.plotting.labels import Label, around, write_labels
-from ufl_beam.plotting.plot import PICTURES
+from ufl_beam.plotting.plot import IN_SPACE, PICTURES
+from ufl_beam.plotting.space_pictures import COMPONENTS, draw_envelope_in_space
 from ufl_beam.plotting.style import BLUE, COLORS, GREY, INK, ORANGE, RED, picture, shade, with_unit
 from ufl_beam.structures.calibration_result import Calibration
 from ufl_beam.structures.fatigue import Fatigue, HotSpot
@@ -114,6 +115,10 @@ def draw_combinations(
 ) -> Figure:
     """Draw the envelope of a section force over load combinations on the undeformed frame."""
     solution, number = next(iter(combined.solutions.values())), len(combined.solutions)
+    if solution.scene.in_space:
+        return draw_envelope_in_space(
+            solution, combined, f"extremes of {number} load combinations", quantity, ax
+        )
     words = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}"
     title = words, f"of {number} load combinations"
     return draw_envelope(solution, title, quantity, bounds(solution, combined, quantity), ax)
@@ -331,6 +336,7 @@ def _of_forces(draw: Any, names: Sequence[str] = ("M", "N", "V")) -> dict[str, A
     return {name: partial(draw, quantity=name) for name in names}
 
 
+IN_SPACE[LoadCombinations] = _of_forces(draw_combinations, COMPONENTS)
 PICTURES.update({
     Calibration: {"fit": draw_calibration},
     Storeys: _of_forces(draw_storeys, ("drift", "shear")),

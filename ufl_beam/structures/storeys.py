@@ -11,8 +11,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import Parameter, Tabular
-from ufl_beam.errors import ArgumentError, require_kind, require_sequence
+from ufl_beam.errors import ArgumentError, require_kind, require_sequence, shorten
 from ufl_beam.model.bodies import AttachmentPoint, require_place
+from ufl_beam.model.checks import require_vector
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.hinge_histories import index_of_largest
@@ -81,8 +82,13 @@ class Storeys(Tabular):
         return f"<Storeys: {len(self.heights)}, {len(self.times)} states>"
 
 
-def storeys(solution: Solution, levels: Sequence[AttachmentPoint]) -> Storeys:
-    """Return drifts and shears of the storeys between levels; y points upwards.
+def storeys(
+    solution: Solution,
+    levels: Sequence[AttachmentPoint],
+    *,
+    direction: Sequence[float] | None = None,
+) -> Storeys:
+    """Return drifts and shears of the storeys between levels; y points upwards, in space z.
 
     The drift of a storey is the difference of the horizontal displacements of its two levels.  Its
     shear is the sum of the horizontal forces in beams, links and connectors that a horizontal cut
@@ -91,10 +97,11 @@ def storeys(solution: Solution, levels: Sequence[AttachmentPoint]) -> Storeys:
     Args:
         solution: Run, or path.
         levels: A place at each level, from the feet of the columns to the roof.
+        direction: In space, the horizontal direction (x, y) of drifts and shears.
 
     Raises:
         ArgumentError: A level is not above the one before it, nothing is cut above a level, or a
-            body is cut.
+            body is cut; in space, there is no direction, or a link or connector is cut.
 
     Example:
         >>> mast = ub.Beam((0, 0), (0, 3), section)
@@ -110,28 +117,42 @@ def storeys(solution: Solution, levels: Sequence[AttachmentPoint]) -> Storeys:
         require_place(place, f"storeys: levels[{i}]")
     if len(places) < 2:
         raise ArgumentError("storeys: levels must have at least two places, the lowest first")
-    elevations = np.array([place.point[1] for place in places])
+    in_space, ahead = solution.scene.in_space, np.array([1.0, 0.0])
+    if in_space != (direction is not None):
+        raise ArgumentError(
+            "storeys: in space give direction=(x, y) of drifts and shears; in the plane there is "
+            "none, because they are along x"
+        )
+    if direction is not None:
+        way = np.array(require_vector(direction, "storeys: direction"))
+        if not way.any():
+            raise ArgumentError(f"storeys: direction = {shorten(direction)} has no length")
+        ahead = np.append(way / np.linalg.norm(way), 0.0)
+    elevations = np.array([place.point[-1] for place in places])
     least = SAME_LEVEL * solution.scene.size
     for i in np.flatnonzero(np.diff(elevations) <= least)[:1]:
         raise ArgumentError(
             f"storeys: levels[{i + 1}] = {places[i + 1]} is not above levels[{i}] = {places[i]}; "
             "give the levels from the lowest to the highest"
         )
-    moved = np.column_stack([solution.displacement(place)[:, 0] for place in places])
-    shear = shears_above(solution, elevations[:-1], least)
+    motions = [solution.displacement(place)[:, : len(ahead)] for place in places]
+    moved = np.column_stack([motion @ ahead for motion in motions])
+    shear = shears_above(solution, elevations[:-1], least, ahead)
     heights = np.diff(elevations)
     return Storeys(
         places, solution.times, heights, np.diff(moved, axis=1), shear, solution.parameter
     )
 
 
-def shears_above(solution: Solution, elevations: Array, tolerance: float) -> Array:
+def shears_above(solution: Solution, elevations: Array, tolerance: float, ahead: Array) -> Array:
     """Compute horizontal forces on the scene below horizontal cuts, by the scene above; (n+1, m).
 
-    A cut is just above its elevation (m): points within ``tolerance`` (m) of it are below.
+    They are along the unit vector ``ahead``.  A cut is just above its elevation (m): points within
+    ``tolerance`` (m) of it are below.
     """
     numbering, scene = solution.numbering, solution.scene
-    y = numbering.points[numbering.cells, 1]
+    axis = "yz"[scene.in_space]
+    y = numbering.points[numbering.cells, -1]
     shear, cut_cells = (
         np.zeros((len(solution), len(elevations))),
         list[tuple[int, int, float, int]](),
@@ -146,31 +167,38 @@ def shears_above(solution: Solution, elevations: Array, tolerance: float) -> Arr
             cut_cells.append((k, int(cell), float(fraction), 1 if above[cell, 1] else -1))
         connectors = _cut_connectors(scene, elevation, tolerance)
         for connector, sign in connectors:
+            if scene.in_space:
+                raise ArgumentError(
+                    f"storeys: {connector} is cut just above the level z = {elevation:g} m; in "
+                    "space give levels at which only beams are cut"
+                )
             force = solution.connector(connector).force
-            shear[:, k] += sign * force * solution.directions(connector)[:, 0]
+            shear[:, k] += sign * force * (solution.directions(connector) @ ahead)
         if not connectors and not any(cut[0] == k for cut in cut_cells):
             raise ArgumentError(
-                f"storeys: nothing is cut just above the level y = {elevation:g} m; give a place "
-                "at the feet of the columns of each storey"
+                f"storeys: nothing is cut just above the level {axis} = {elevation:g} m; give a "
+                "place at the feet of the columns of each storey"
             )
     _, cells, fractions, _ = zip(*cut_cells, strict=True) if cut_cells else ((), (), (), ())
     forces = solution.forces_in_cells(cells, fractions, in_plane=True)
     for i, (k, _, _, sign) in enumerate(cut_cells):
-        shear[:, k] += sign * forces[:, i, 0]
+        shear[:, k] += sign * (forces[:, i, : len(ahead)] @ ahead)
     return shear
 
 
 def _cut_connectors(scene: Scene, elevation: float, tol: float) -> list[tuple[Connector, int]]:
     """Return connectors of displacements through a cut, with the sign 1 if b is above it."""
+    axis = "yz"[scene.in_space]
 
     def above(place: AttachmentPoint) -> bool:
-        return place.point[1] > elevation + tol
+        return place.point[-1] > elevation + tol
 
     for body, points in attachment_points(scene).items():
         if body in scene.bodies and len({*map(above, points)}) > 1:
             raise ArgumentError(
-                f"storeys: the level y = {elevation:g} m cuts the body {body.name}, whose internal "
-                "forces are unknown; give a level at which only beams and connectors are cut"
+                f"storeys: the level {axis} = {elevation:g} m cuts the body {body.name}, whose "
+                "internal forces are unknown; give a level at which only beams and connectors are "
+                "cut"
             )
     return [
         (connector, 1 if above(connector.b) else -1)
