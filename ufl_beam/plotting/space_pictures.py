@@ -63,8 +63,8 @@ SIDES = {"V": "V: in its direction", "M": "M: on the side of tension"}
 
 
 @contextmanager
-def _view(ax: Axes | None, points: Array, title: str) -> Iterator[Any]:
-    """Open axes with z up and equal scales, large enough for points (n, 3)."""
+def _view(ax: Axes | None, points: Array, size: float, title: str) -> Iterator[Any]:
+    """Open axes with z up and equal scales, for points (n, 3) of a scene of a size; m."""
     from matplotlib.ticker import MaxNLocator
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
@@ -74,8 +74,8 @@ def _view(ax: Axes | None, points: Array, title: str) -> Iterator[Any]:
             'figure.add_subplot(projection="3d")'
         )
     low, high = points.min(axis=0), points.max(axis=0)
-    middle, largest = (low + high) / 2, float(np.ptp(points, axis=0).max()) or 1.0
-    half = 0.54 * np.maximum(high - low, LEAST_WIDTH * largest)
+    middle = (low + high) / 2
+    half = 0.54 * np.maximum(high - low, LEAST_WIDTH * size)
     x, y, z = FROM_A_SIDE
     with style.panel(ax, SIZE, projection="3d") as panel:
         axes: Any = panel
@@ -93,6 +93,7 @@ def _view(ax: Axes | None, points: Array, title: str) -> Iterator[Any]:
             )
             axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
             axis.set_label_text(f"{name} (m)")
+            axis.labelpad = 7.0
             axis.set_tick_params(labelsize=style.font_size(10.5))
         axes.set_box_aspect(half, zoom=0.98)
         axes.set_title(title, loc="left")
@@ -168,7 +169,7 @@ def _draw_rods(axes: Any, shape: DeformedShape, color: str, *, connectors: bool 
     """Draw lines from bodies to their attachments, and along links and connectors."""
     scene = shape.canvas.scene
     attached = {spot for spots in shape.canvas.spots.values() for spot in spots}
-    links = {joint.places for joint in scene.joints}
+    links = {joint.places for joint in scene.joints if joint.is_rod}
     rods, springs, arms = list[Array](), list[Array](), list[Array]()
     for rod in scene_rods(scene):
         line = np.array([shape.at(rod.a), shape.at(rod.b)])
@@ -203,9 +204,9 @@ def _label(axes: Any, labels: Sequence[tuple[str, str, Array, Array, bool]]) -> 
     write_labels(axes, found)
 
 
-def _size(points: Array) -> float:
-    """Return the largest extent of points along an axis; m."""
-    return float(np.ptp(points, axis=0).max()) or 1.0
+def _size(scene: Scene, points: Array) -> float:
+    """Return the largest extent of points along an axis, or a part of the scene's size; m."""
+    return max(float(np.ptp(points, axis=0).max()), 0.3 * scene.size)
 
 
 # -- solutions ---------------------------------------------------------------------------------
@@ -261,7 +262,7 @@ def _draw_frame(
     solution = shape.canvas.solution
     assert solution is not None
     points = np.concatenate([points_in_space(shape), points_in_space(shape.canvas.undeformed)])
-    size, ordinates, labels = _size(points), list[Any](), list[Any]()
+    size, ordinates, labels = _size(solution.scene, points), list[Any](), list[Any]()
     if diagrams:
         words, columns, unit = DIAGRAMS[quantity]
         largest = max(float(np.linalg.norm(x, axis=1).max(initial=0.0)) for _, x in diagrams)
@@ -275,14 +276,14 @@ def _draw_frame(
                 ordinates.append((axis, axis + DIAGRAM * size / largest * way, values))
             points = np.concatenate([points, *(tips for _, tips, _ in ordinates)])
             labels = _peaks(ordinates, factor, PEAK * largest)
-    with _view(ax, points, title) as axes:
+    with _view(ax, points, size, title) as axes:
         if n is not None or not diagrams:
             _draw_undeformed(axes, shape.canvas)
         _draw_scene(axes, shape, SYMBOL * size)
         for color, words in _draw_areas(axes, ordinates, quantity):
             axes.plot([], [], color=color, linewidth=6, alpha=0.5, label=words)
         if ordinates:
-            axes.legend(loc="lower left", fontsize=style.font_size(11.0))
+            style.draw_legend(axes, ax, loc="outside lower left", ncols=2)
         _label(axes, labels)
     return style.parent_figure(axes)
 
@@ -354,14 +355,13 @@ def draw_shapes_in_space(
     shapes = [canvas.shape(n) for n in chosen]
     points = np.concatenate([points_in_space(x) for x in (canvas.undeformed, *shapes)])
     colors = style.scale("viridis", 0.0, 0.88, *np.sort(along[chosen])[[0, -1]])
-    with _view(ax, points, style.magnified(magnify, "")) as axes:
+    size = _size(solution.scene, points)
+    with _view(ax, points, size, style.magnified(magnify, "")) as axes:
         _draw_undeformed(axes, canvas)
         for shape, color in zip(shapes, map(to_hex, colors.to_rgba(along[chosen])), strict=True):
             _line(axes, _beams(shape, shape.nodes), color, 2.2, 4)
             _draw_rods(axes, shape, color, connectors=False)
-        _draw_scene(
-            axes, shapes[-1], SYMBOL * _size(points), to_hex(colors.to_rgba(along[chosen[-1]]))
-        )
+        _draw_scene(axes, shapes[-1], SYMBOL * size, to_hex(colors.to_rgba(along[chosen[-1]])))
         bar = axes.figure.colorbar(colors, ax=axes, shrink=0.6, aspect=25, pad=0.08)
         bar.set_label(solution.parameter.name)
     return style.parent_figure(axes)
@@ -378,7 +378,7 @@ def draw_model_in_space(scene: Scene, *, ax: Axes | None = None) -> Figure:
     canvas = Canvas(scene, 1.0, 1.0)
     shape = canvas.undeformed
     points = points_in_space(shape)
-    size, labels = _size(points), list[Any]()
+    size, labels = _size(scene, points), list[Any]()
     arrows = [*_loads(scene, size), *_velocities(scene, size)]
     points = np.concatenate([points, *(line for line, *_ in arrows)])
     lines = _beams(shape, shape.nodes)
@@ -386,7 +386,7 @@ def draw_model_in_space(scene: Scene, *, ax: Axes | None = None) -> Figure:
     title = counted(
         (len(scene.beams), "beam", "beams"), cells, (len(scene.bodies), "body", "bodies")
     )
-    with _view(ax, points, f"model: {title}") as axes:
+    with _view(ax, points, size, f"model: {title}") as axes:
         _draw_scene(axes, shape, SYMBOL * size)
         _markers(axes, [x for line in lines for x in line[1:-1]], ".", INK, INK, 4.0, 4.5)
         for line, color, double, text in arrows:
