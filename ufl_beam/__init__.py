@@ -117,6 +117,7 @@ from ufl_beam.output.history import Events, History
 from ufl_beam.output.output_files import version
 from ufl_beam.output.paraview_files import VTKHDF, XDMF
 from ufl_beam.output.section_forces import Diagram as Diagram
+from ufl_beam.output.section_forces import DiagramInSpace as DiagramInSpace
 from ufl_beam.parallel import print_once
 from ufl_beam.plotting.films import Film as Film
 from ufl_beam.plotting.plot import plot
@@ -238,7 +239,8 @@ __all__ = [
 ]  # fmt: skip
 
 RESULTS = [
-    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Derivatives", "Diagram", "DolfinxView",
+    "BodyPoint", "Branch", "Buckling", "CriticalPoint", "Derivatives", "Diagram", "DiagramInSpace",
+    "DolfinxView",
     "Energy", "Event", "Extent", "Film", "LinearModel", "Modes", "Path", "Place", "Range",
     "Study", "Tradeoff",
 ]  # fmt: skip

@@ -505,6 +505,7 @@ def refused():
         "modes": lambda: ub.modes(scene, 1),
         "follow": lambda: ub.follow(scene, control, steps=1),
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
+        "joint": lambda: run.joint(None),
         "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.mesh,
     }

@@ -249,6 +249,7 @@ OWN = {
         [None, 1.0, "ab", [(0, 0)], [(0, 0), None], [(0, 0), (1, NAN)]])},
     "Beam.at": {"s": (0.5, [*NUMBER, -0.1, 1.1])},
     "Place": {"s": (0.5, [*NUMBER, -0.1, 1.1])},
+    "HotSpot.fibre": {"z": (None, [0.1, "x"])},
     # joints, connectors and their laws
     "Rigid": CORNER,
     "Revolute": CORNER,
@@ -402,7 +403,8 @@ OWN = {
         "parameters": ({"force": 1.0}, [*LIST, {}, {"load": 1.0}, {1: 1.0}, {"force": (1.0, 2.0)},
             {"force": (3.0, 1.0, 2.0)}, *({"force": x} for x in [*NUMBER, 0.0])]),
         "measured": ([BENT], [*LIST, []]), "starts": (1, [*COUNT, 2])},
-    "storeys": {"levels": ([BEAM.start, ub.ground(0, 1)], [*LIST, [BEAM.start]])},
+    "storeys": {"levels": ([BEAM.start, ub.ground(0, 1)], [*LIST, [BEAM.start]]),
+        "direction": (None, [(1, 0), "x"])},
     "hinge_table": {"limits": ({"IO": 0.1},
         [*LIST, {1: 0.1}, {"IO": 0.2, "LS": 0.1}, {"IO": 0.0}]),
         "n": (-1, [None, "a", 0.5, [0], 10**6, -(10**6)]),
@@ -427,7 +429,8 @@ METHODS = {
 
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Calibration", "Coefficients", "Connector", "CriticalPoint", "Cycles",
-    "Decay", "DemandCurves", "Derivatives", "Diagram", "DolfinxView", "Energy", "Envelope",
+    "Decay", "DemandCurves", "Derivatives", "Diagram", "DiagramInSpace",
+    "DolfinxView", "Energy", "Envelope",
     "Equations", "Event", "Extent", "Film", "Fragility", "Governing", "HingeFormation",
     "InteractionDiagram", "Joint", "LinearModel", "LoadCombinations", "Modes", "MomentCurvature",
     "Path", "Pushover", "Solution", "SpectralResponse", "Step", "Study", "Support",

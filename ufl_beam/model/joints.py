@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from ufl_beam.display import bracketed
-from ufl_beam.errors import ModelError
+from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.bodies import (
     AttachmentPoint,
     BodyPoint,
@@ -281,10 +281,18 @@ class Universal(_AtPoint):
         self.__post_init__()
 
     def __post_init__(self) -> None:
-        _require_in_space(self, "Revolute")
-        if np.ndim(self.axes) != 2 or len(self.axes) != 2:
-            raise ModelError(f"{self}: axes = {self.axes} must be two directions (x, y, z)")
         a, b = self.places
+        require_place(a, "Universal: a")
+        require_place(b, "Universal: b")
+        _require_in_space(self, "Revolute")
+        try:
+            given = np.array(self.axes, dtype=np.float64)
+        except (TypeError, ValueError):
+            given = np.zeros(0)
+        if given.shape != (2, 3) or not np.isfinite(given).all() or not given.any(axis=1).all():
+            raise ModelError(
+                f"{self}: axes = {shorten(self.axes)} must be two directions (x, y, z)"
+            )
         first, second = (unit_axis(a, b, axis, "Universal") for axis in self.axes)
         if abs(np.dot(first, second)) > PERPENDICULAR:
             raise ModelError(f"{self}: axes = {self.axes} must be perpendicular to each other")

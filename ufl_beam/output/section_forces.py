@@ -55,6 +55,16 @@ class DiagramInSpace(NamedTuple):
         T: Torsional moment; N m.
         M2: Bending moment about axis 2, positive with tension on the side of axis 3; N m.
         M3: Bending moment about axis 3, positive with tension on the side opposite to axis 2; N m.
+
+    Example:
+        >>> tube = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
+        >>> arm = ub.Beam((0, 0, 0), (2, 0, 0), tube, up=(0, 0, 1))
+        >>> pull = ub.PointLoad(arm.end, force=(0, 3.0, 5.0))
+        >>> mast = ub.Scene([arm], supports=[ub.Clamped(arm.start)], loads=[pull])
+        >>> run = ub.simulate(mast, ub.Static(), t=(0, 1), dt=1.0)
+        >>> diagram = run.diagram(arm)
+        >>> print(diagram.V2[0].round(3), diagram.V3[0].round(3))  # up, and to the right
+        5.0 -3.0
     """
 
     s: Array

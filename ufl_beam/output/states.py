@@ -375,6 +375,7 @@ class States:
             ArgumentError: The joint is not in the scene, or the second place shares unknowns with
                 another one.
         """
+        self.scene.require_plane("joint")
         resultants, (a, b, *_) = connector_indices(self.scene, joint), joint.places
         signs = signs_on_second_place(joint)
         rotations = [self.displacement(place)[:, 2] for place in (a, b)]

@@ -390,7 +390,9 @@ def draw_model_in_space(scene: Scene, *, ax: Axes | None = None) -> Figure:
         _draw_scene(axes, shape, SYMBOL * size)
         _markers(axes, [x for line in lines for x in line[1:-1]], ".", INK, INK, 4.0, 4.5)
         for line, color, double, text in arrows:
-            _draw_arrow(axes, line, color, double)
+            for end in (1.0, 0.82)[: 1 + double]:
+                look = {"color": color, "linewidth": 1.8, "arrow_length_ratio": 0.25 / end}
+                axes.quiver(*line[0], *(end * (line[1] - line[0])), zorder=6, **look)
             if text:
                 labels.append((text, color, line[0], line[0] - line[1], False))
         up = np.array([0.0, 0.0, 0.1 * size])
@@ -400,8 +402,9 @@ def draw_model_in_space(scene: Scene, *, ax: Axes | None = None) -> Figure:
             named = zip(scene.beams, lines, strict=True)
             labels += [(x.name, TEXT, points_along(at, [0.5])[0], up, False) for x, at in named]
         captions = [
-            f"gravity {_vector(x.acceleration)} m/s²" for x in scene.loads if isinstance(x, Gravity)
-        ]
+            f"gravity ({', '.join(map(style.number, x.acceleration))}) m/s²"
+            for x in scene.loads if isinstance(x, Gravity)
+        ]  # fmt: skip
         axes.text2D(
             0.01, 0.97, "\n".join(captions), transform=axes.transAxes, color=RED, va="top",
             fontsize=style.font_size(11.0),
@@ -410,68 +413,44 @@ def draw_model_in_space(scene: Scene, *, ax: Axes | None = None) -> Figure:
     return style.parent_figure(axes)
 
 
-def _vector(x: Sequence[float]) -> str:
-    return f"({', '.join(map(style.number, x))})"
-
-
 Arrow = tuple[Array, str, bool, str]  # tail and tip (2, 3), m; colour; whether a moment; label
-
-
-def _draw_arrow(axes: Any, line: Array, color: str, double: bool) -> None:
-    """Draw an arrow, with a second head behind the first for moments."""
-    for end in (1.0, 0.82)[: 1 + double]:
-        step = end * (line[1] - line[0])
-        axes.quiver(
-            *line[0], *step, color=color, linewidth=1.8, arrow_length_ratio=0.25 / end, zorder=6
-        )
 
 
 def _loads(scene: Scene, size: float) -> Iterator[Arrow]:
     """Yield arrows of loads: forces end at their places, moments begin there."""
-    loads: Sequence[Any] = scene.loads
+    loads: Sequence[Any] = [x for x in scene.loads if hasattr(x, "place") or hasattr(x, "beam")]
     vectors = [
-        (load, name, np.array(vector, dtype=np.float64))
+        (load, (name, hasattr(load, "beam")), np.array(vector, dtype=np.float64))
         for load in loads for name in ("force", "moment")
         if np.any(vector := getattr(load, name, 0.0))
     ]  # fmt: skip
-    groups = dict.fromkeys((_kind(load, name) for load, name, _ in vectors), 0.0)
-    for load, name, vector in vectors:
-        key = _kind(load, name)
-        groups[key] = max(groups[key], float(np.linalg.norm(vector)))
-    for load, name, vector in vectors:
+    for load, kind, vector in vectors:
         length = float(np.linalg.norm(vector))
-        step = ARROW * size * (0.4 + 0.6 * length / groups[_kind(load, name)]) * vector / length
-        beam, unit = getattr(load, "beam", None), "N" if name == "force" else "N m"
-        if beam is not None:
-            at = points_along(
-                np.array([beam.curve(s) for s in beam.vertices(())]), np.linspace(0, 1, 7)
-            )
-            text, step = f"{with_unit(length, unit)}/m", 0.6 * step
+        largest = max(float(np.linalg.norm(x)) for _, other, x in vectors if other == kind)
+        step = ARROW * size * (0.4 + 0.6 * length / largest) * vector / length
+        turns, along = kind[0] == "moment", kind[1]
+        text = with_unit(length, "N m" if turns else "N")
+        if along:
+            axis = np.array([load.beam.curve(s) for s in load.beam.vertices(())])
+            at, text, step = points_along(axis, np.linspace(0, 1, 7)), f"{text}/m", 0.6 * step
         else:
-            at, text = np.array([load.place.point]), with_unit(length, unit)
+            at = np.array([load.place.point])
         for k, point in enumerate(at):
-            ends = (point, point + step) if name == "moment" else (point - step, point)
-            yield np.array(ends), RED, name == "moment", text * (k == len(at) // 2)
-
-
-def _kind(load: Any, name: str) -> tuple[str, bool]:
-    return name, hasattr(load, "beam")
+            ends = np.array([point, point + step] if turns else [point - step, point])
+            yield ends, RED, turns, text * (k == len(at) // 2)
 
 
 def _velocities(scene: Scene, size: float) -> Iterator[Arrow]:
-    """Yield arrows of initial velocities at the middles of beams and bodies."""
+    """Yield arrows of initial velocities, with labels at the first part of each."""
     found = [
-        (x.center if isinstance(x, Body) else x.at(0.5).point, velocity)
-        for velocity in scene.initial for x in velocity.beams
+        (k, velocity, x.center if isinstance(x, Body) else x.at(0.5).point)
+        for velocity in scene.initial for k, x in enumerate(velocity.beams)
     ]  # fmt: skip
-    speeds = [np.array(velocity.at(*point)[:3], dtype=np.float64) for point, velocity in found]
-    fastest = max((float(np.linalg.norm(x)) for x in speeds), default=0.0)
-    for speed, (point, velocity) in zip(speeds, found, strict=True):
-        at = np.array(point, dtype=np.float64)
-        for vector, largest, unit in (
-            (speed, fastest, "m/s"),
-            (np.array(velocity.angular, dtype=np.float64), None, "rad/s"),
-        ):
+    speeds = [float(np.linalg.norm(velocity.at(*point)[:3])) for _, velocity, point in found]
+    for k, velocity, point in found:
+        spin = np.array(velocity.angular, dtype=np.float64)
+        for turns, vector in enumerate((np.array(velocity.at(*point)[:3]), spin)):
             if (length := float(np.linalg.norm(vector))) > 0.0:
-                step = ARROW * size * length / (largest or length) * vector / length
-                yield np.array([at, at + step]), GREEN, unit == "rad/s", with_unit(length, unit)
+                step = ARROW * size * vector / (length if turns else max(speeds))
+                text = with_unit(length, ("m/s", "rad/s")[turns])
+                yield np.add(point, [0.0 * step, step]), GREEN, bool(turns), text * (k == 0)

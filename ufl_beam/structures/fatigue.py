@@ -311,6 +311,8 @@ class HotSpot(Record):
             z: In space, distance from the axis along axis 3 of the section, and y along axis 2; m.
         """
         require_kind(place, Place, "HotSpot: place")
+        if (z is None) != (len(place.point) == 2):
+            raise ArgumentError(f"HotSpot {place}: give z in space, and not in the plane")
         require_number(y, f"HotSpot {place}: y")
         require_number(E, f"HotSpot {place}: E", positive=True)
         require_number(factor, f"HotSpot {place}: factor", positive=True)
@@ -318,10 +320,6 @@ class HotSpot(Record):
         far = y / section.depth
         plausibility.check(f"HotSpot {place}", "distance from the axis over the depth", far)
         per_N, per_M = factor * E / section.EA, -factor * E * y / section.EI
-        if (z is None) != (len(place.point) == 2):
-            raise ArgumentError(
-                f"HotSpot {place}: in space give y and z; in the plane there is no z"
-            )
         if z is None:
             return cls(place, lambda N, V, M: per_N * N + per_M * M)
         require_number(z, f"HotSpot {place}: z")
