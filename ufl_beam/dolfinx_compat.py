@@ -135,11 +135,11 @@ def line_mesh(
     comm: MPI.Intracomm = MPI.COMM_SELF,
     ranks: npt.NDArray[np.int32] | None = None,
 ) -> mesh.Mesh:
-    """Create a plane mesh of straight cells (num_cells, 2); points (n, 2) in m.
+    """Create a mesh of straight cells (num_cells, 2); points (n, 2), or (n, 3) in space, in m.
 
     ``ranks`` has the process of each cell if there are several; all pass the whole mesh.
     """
-    line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
+    line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(points.shape[1],)))
     most = int(np.bincount(cells.ravel()).max(initial=2))
     more: dict[str, Any] = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": most}
     if ranks is not None:

@@ -507,7 +507,7 @@ def refused():
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
         "joint": lambda: run.joint(None),
         "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),
-        "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.mesh,
+        "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.forms,
     }
 
 

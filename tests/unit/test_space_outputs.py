@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import ufl
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 from scipy.spatial.transform import Rotation
@@ -257,6 +258,29 @@ def test_a_checkpoint_changes_no_bit(shared_path):
         (whole.acceleration(arm), continued.acceleration(arm)),
     ):
         assert all((a == b).all() for a, b in zip(one, other, strict=True))
+
+
+def test_functions_of_dolfinx():
+    """The mesh is in space, and energies and lengths are integrals over it."""
+    simulation = ub.Simulation(machine(), ub.EnergyMomentum(), newton=EXACT)
+    simulation.step_to(0.02)
+    view, (arm,) = simulation.dolfinx, simulation.scene.beams
+    C, e, x = view.stiffness, view.strains, ufl.SpatialCoordinate(view.mesh)
+    assert view.total(1.0 * view.dx) == pytest.approx(math.sqrt(5), rel=1e-13)
+    assert view.total(x[1]) == pytest.approx(math.sqrt(5) / 2, rel=1e-13)
+    stored = view.total(sum(C[i] * e[i] ** 2 / 2 for i in range(6)) * view.dx)
+    spring = simulation.now.connector(simulation.scene.connectors[2])
+    whole = simulation.now.energy.state["stored"][0]
+    assert stored == pytest.approx(whole - 100.0 / 2 * spring.motion[0] ** 2, rel=1e-9)
+    forces = view.forces.x.array.reshape(-1, 6)
+    assert (forces == simulation.section_forces()[view.cells]).all()
+    motion, size = view.configuration, simulation.now.displacement(arm.end)[0]
+    for k in range(6):
+        values = motion.sub(k).collapse().x.array
+        assert np.abs(values - size[k]).min() < 1e-15
+    v = view.velocity.x.array
+    assert (v == simulation.velocities()[0][view.dofs]).all()
+    simulation.close()
 
 
 A, B = ub.Beam((0, 0, 0), (1, 0, 0), SECTION), ub.Beam((1, 0, 0), (1, 1, 0), SECTION)

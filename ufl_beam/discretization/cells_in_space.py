@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.function_spaces import STIFFNESS, Fields
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint
 
 TURNS = "turns"
@@ -19,7 +19,7 @@ TURNS = "turns"
 so that all numbers begin with zero."""
 
 
-STIFFNESS_IN_SPACE = "EA", "GA", "GA3", "GJ", "EI2", "EI"
+STIFFNESS_IN_SPACE = STIFFNESS[3]
 """Stiffnesses for the strains along the axes 1, 2, 3 of a section, and curvatures about them."""
 
 

@@ -20,6 +20,14 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.scene import Scene
 
+STIFFNESS: dict[int, tuple[str, ...]] = {
+    2: ("EA", "GA", "EI"), 3: ("EA", "GA", "GA3", "GJ", "EI2", "EI"),
+}  # fmt: skip
+"""Stiffnesses of sections in the plane, and for axes 1, 2, 3 of strains and curvatures in space."""
+
+INERTIA: dict[int, tuple[str, ...]] = {2: ("rhoA", "rhoI"), 3: ("rhoA", "rhoI2", "rhoI")}
+"""Inertias of sections in the plane and in space."""
+
 
 class Element:
     """Finite element of the beams on a mesh of cells, and the functions in which forms are written.
@@ -37,16 +45,20 @@ class Element:
 
     def __init__(self, mesh: Mesh, cells: meshes.Mesh) -> None:
         self.degree, self._lumped, self._cell = mesh.degree, mesh.lumped, cells
+        in_space = cells.geometry.dim == 3
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
-        along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
-        along.x.array[along.function_space.dofmap.list] = 0.0, 1.0
-        self.anywhere = Axis(self._cell, mesh.nodes, along)
-        self.axis = self.anywhere if mesh.degree > 1 else Axis(self._cell, mesh.nodes, 0.5)
-        self.space = fem.functionspace(self._cell, basix.ufl.mixed_element([line, line, line]))
+        if not in_space:  # forms in space are no forms of UFL
+            along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
+            along.x.array[along.function_space.dofmap.list] = 0.0, 1.0
+            self.anywhere = Axis(self._cell, mesh.nodes, along)
+            self.axis = self.anywhere if mesh.degree > 1 else Axis(self._cell, mesh.nodes, 0.5)
+        mixed = basix.ufl.mixed_element([line] * (6 if in_space else 3))
+        self.space = fem.functionspace(self._cell, mixed)
         self.q0, self.q1 = self.configuration(), self.configuration()
         self.w = ufl.TestFunction(self.space)
         self.stiffness, self.inertia = (
-            fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,)))) for n in (3, 2)
+            fem.Function(fem.functionspace(self._cell, ("DG", 0, (n,))))
+            for n in ((6, 3) if in_space else (3, 2))
         )
 
     def configuration(self) -> fem.Function:
@@ -197,12 +209,11 @@ class DolfinxFields(Fields):
         order: Index = np.asarray(self.mesh.topology.original_cell_index)
         # The direction of a beam is the order of the vertices in its cells.
         expected = numbering.points[numbering.cells[cells[order]]]
-        if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
+        if not np.array_equal(cell_coordinates(self.mesh)[:, :, : expected.shape[2]], expected):
             raise RuntimeError("this version of DOLFINx reverses cells; please report it")
         super().__init__(subdomain, order if positions is None else positions[order])
         self.element = element = Element(numbering.mesh, self.mesh)
-        for function, names in (
-            (element.stiffness, ("EA", "GA", "EI")), (element.inertia, ("rhoA", "rhoI")),
-        ):  # fmt: skip
+        d = expected.shape[2]
+        for function, names in ((element.stiffness, STIFFNESS[d]), (element.inertia, INERTIA[d])):
             dofs = dofs_of_cells(function.function_space)
-            function.x.array[dofs] = self.section_values(*names)
+            function.x.array[dofs] = np.nan_to_num(self.section_values(*names).astype(float))

@@ -20,6 +20,7 @@ from ufl_beam.discretization.beam_forms import (
     mass_form,
 )
 from ufl_beam.discretization.function_spaces import (
+    STIFFNESS,
     DolfinxFields,
     dofs_of_cells,
     integrated,
@@ -68,6 +69,9 @@ class DolfinxView:
     Each beam has its own vertices, also at joints.  So a function on the mesh may jump at a joint.
     :attr:`dofs` maps degrees of freedom of :attr:`function_space` to entries of ``simulation.q``.
 
+    In space, functions have six components: the displacement and the rotation vector, or strains
+    and forces along the axes 1, 2, 3 of the sections, then about them.  There are no :attr:`forms`.
+
     Example:
         >>> from dolfinx import fem
         >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -81,7 +85,6 @@ class DolfinxView:
     """
 
     def __init__(self, view: Any) -> None:  # a `StateView`, which this module must not import
-        view.scene.require_plane("dolfinx")
         self._view = view
         self._fields = DolfinxFields(view.subdomain)
         self._functions: dict[str, fem.Function] = {}
@@ -178,7 +181,8 @@ class DolfinxView:
             >>> bool(view.stiffness.x.array[2] == section.EI)
             True
         """
-        return self._function("stiffness", self._fields.section_values("EA", "GA", "EI"))
+        names = STIFFNESS[self.mesh.geometry.dim]
+        return self._function("stiffness", self._fields.section_values(*names))
 
     @property
     def configuration(self) -> fem.Function:
@@ -189,7 +193,12 @@ class DolfinxView:
             >>> bool(np.isclose(ψ.x.array.min(), simulation.displacement(beam.end)[2]))
             True
         """
-        return self._function("configuration", self._view.q[self._fields.cell_dofs])
+        values = self._view.q[self._fields.cell_dofs]
+        if self._view.scene.in_space:
+            nodes = self._view.subdomain.numbering.cells[self.cells]
+            motions = self._view.now.motion_of_nodes(0)[nodes]
+            values = motions.transpose(0, 2, 1).reshape(values.shape)
+        return self._function("configuration", values)
 
     @property
     def velocity(self) -> fem.Function:
@@ -284,6 +293,7 @@ class DolfinxView:
             >>> bool(np.isclose(v @ M @ v / 2, simulation.entries()[0]["kinetic"], rtol=1e-12))
             True
         """
+        self._view.scene.require_plane("dolfinx.forms")
         forms = self._forms
         for function in (forms.q0, forms.q1):
             put_in_cells(function, self._view.q[self._fields.cell_dofs])
