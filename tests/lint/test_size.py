@@ -11,9 +11,9 @@ import pytest
 PACKAGE = Path(__file__).parents[2] / "ufl_beam"
 BLOCKS = {"blocks.c", "elements_simd.c"}
 LIMITS = {
-    "Python of blocks": 6231,
+    "Python of blocks": 6_231,
     "C of blocks": 504,
-    "Python beside blocks": 47557,
+    "Python beside blocks": 47_557,
     "C beside blocks": 5_755,
 }
 
