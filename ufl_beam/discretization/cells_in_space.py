@@ -80,9 +80,14 @@ class CellsOfState(NamedTuple):
     axes: Array
 
     @classmethod
-    def of(cls, fields: Fields, q: Array, turns: Array) -> CellsOfState:
-        """Return the cells in the configuration ``q``; ``turns`` are quaternions (nodes, 4)."""
-        numbering, (lengths, axes) = fields.subdomain.numbering, cell_axes(fields)
+    def of(
+        cls, numbering: DofNumbering, undeformed: tuple[Array, Array], q: Array, turns: Array
+    ) -> CellsOfState:
+        """Return the cells in the configuration ``q``, from their :func:`cell_axes`.
+
+        ``turns`` are quaternions; (nodes, 4).
+        """
+        lengths, axes = undeformed
         a, b = numbering.cells.T
         at = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
         first, second = _rotations(turns[a]), _rotations(turns[b])

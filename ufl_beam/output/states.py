@@ -19,6 +19,7 @@ from ufl_beam.discretization.cells_in_space import (
     STIFFNESS_IN_SPACE,
     TURNS,
     CellsOfState,
+    cell_axes,
     momentum_in_space,
     rotation_vectors,
     turns_at,
@@ -98,6 +99,24 @@ class Cells:
     def strains(self) -> Callable[[Array], Array]:
         """Function that computes the strains of all cells, see :func:`strains_of`."""
         return strains_of(self.fields)
+
+    @cached_property
+    def axes(self) -> tuple[Array, Array]:
+        """Lengths and axes of cells in space, see :func:`cell_axes`."""
+        return cell_axes(self.fields)
+
+    @cached_property
+    def loads_in_space(self) -> list[tuple[Any, Array]]:
+        """Dead loads along beams in space, and their forces on nodes of cells; (n, 2, 3); N."""
+        found, none = list[tuple[Any, Array]](), np.zeros(self.numbering.size)
+        for load in self.numbering.scene.loads:
+            if isinstance(load, Gravity | LineLoad):
+                some = add_dead_load(load, self.fields.subdomain, none)
+                along: Array = np.zeros((len(self.numbering.cells), 6, 2))
+                if some is not None:
+                    along[some[0]] = some[1].reshape(-1, 6, 2)
+                found.append((load, along[:, :3].transpose(0, 2, 1)))
+        return found
 
     @cached_property
     def along(self) -> ForcesAlongCells:
@@ -486,18 +505,17 @@ class States:
 
     def _in_cells_of_space(self, n: int, pieces: Array, in_scene: bool = False) -> Array:
         """Compute section forces of strains of a state, and of dead loads along cells."""
-        fields, t = self.cells.fields, float(self._row("t", n))
-        cells = CellsOfState.of(fields, self._row("q", n), self._row(TURNS, n))
-        along: Array = np.zeros((len(cells.lengths), 6, 2))
-        for load in (x for x in self.scene.loads if isinstance(x, Gravity | LineLoad)):
-            factor = value_at(load.amplitude, t, load)
-            some = add_dead_load(load, fields.subdomain, np.zeros(self.numbering.size))
-            if some is not None:  # gravity also acts on bodies
-                along[some[0]] += factor * some[1].reshape(-1, 6, 2)
-        stiffness = fields.section_values(*STIFFNESS_IN_SPACE)
-        on_nodes = along[:, :3].transpose(0, 2, 1)
-        resultants = stiffness * cells.strains()
-        return cells.section_forces(pieces, resultants, on_nodes, in_scene=in_scene)
+        t, cells = float(self._row("t", n)), self._in_space(n)
+        along: Array = np.zeros((len(cells.lengths), 2, 3))
+        for load, on_nodes in self.cells.loads_in_space:
+            along += value_at(load.amplitude, t, load) * on_nodes
+        resultants = self.cells.fields.section_values(*STIFFNESS_IN_SPACE) * cells.strains()
+        return cells.section_forces(pieces, resultants, along, in_scene=in_scene)
+
+    def _in_space(self, n: int) -> CellsOfState:
+        """Return the cells in the n-th state of a scene in space."""
+        state = self._row("q", n), self._row(TURNS, n)
+        return CellsOfState.of(self.numbering, self.cells.axes, *state)
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
         """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m.
@@ -595,8 +613,7 @@ class States:
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         if self.scene.in_space:
-            cells = CellsOfState.of(self.cells.fields, self._row("q", n), self._row(TURNS, n))
-            return cells.strains()
+            return self._in_space(n).strains()
         strains = np.empty((len(self.numbering.cells), 3))
         in_points = self.cells.strains(self._row("q", n)).reshape(len(strains), -1, 3)
         weights = self.numbering.mesh.point_weights
