@@ -121,6 +121,7 @@ flight = fly(0.05, ub.EnergyMomentum(), 12.0, record=ub.VTKHDF(output / "tumblin
 camera = ub.Camera(follow=beam.at(0.5), width=16.0)
 ub.render(flight, output / "tumbling_beam.png", quantity="M", camera=camera)
 ub.animate(flight, output / "tumbling_beam.gif", seconds=6, quantity="M", camera=camera)
+ub.plot(flight, "shapes", count=13).savefig(output / "tumbling_beam_shapes.png")
 ub.plot(flight, "energy").savefig(output / "tumbling_beam_energy.png")
 ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("tumbling*")), sep="\n  ")
 
