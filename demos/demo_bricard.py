@@ -16,6 +16,7 @@
 
 # %%
 # SPDX-License-Identifier: MIT
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,7 @@ def rigid_loop():
     """Return the loop of rigid rods."""
     rods = [
         ub.Body(tuple((a + b) / 2), mass=1.0, inertia=tensor(b - a), name=f"rod {k + 1}")
-        for k, (a, b) in enumerate(zip(corners[:-1], corners[1:], strict=True))
+        for k, (a, b) in enumerate(pairwise(corners))
     ]
     joints = []
     for k, (corner, axis) in enumerate(zip(corners, axes, strict=True)):
