@@ -503,7 +503,6 @@ def refused():
         "buckling": lambda: ub.buckling(scene, 1),
         "modes": lambda: ub.modes(scene, 1),
         "follow": lambda: ub.follow(scene, control, steps=1),
-        "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
         "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),
         "section forces": lambda: run.section_forces_at(BEAM.end),
         "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),

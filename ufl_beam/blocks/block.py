@@ -367,10 +367,10 @@ class Block(LoadTerm):
         if archive.has(f"time of {name}"):
             self.start(q)
 
-    def keep_states(self, archive: Archive, first: int = 0) -> None:
-        """Save or restore the states of the elements, without the first ones."""
-        if number := len(self.statement.state) - first:
-            indices, states = self._elements.indices, self._states[:, first:]
+    def keep_states(self, archive: Archive, first: int = 0, last: int | None = None) -> None:
+        """Save or restore the states of the elements from the first to the last one."""
+        if number := len(self.statement.state[first:last]):
+            indices, states = self._elements.indices, self._states[:, first:last]
             rows = states.transpose(0, 2, 1).reshape(-1, number)[: len(indices)]
             states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
 

@@ -99,6 +99,11 @@ def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) ->
     return a * Rotation.from_rotvec(weights[1] * (a.inv() * b).as_rotvec())
 
 
+def rotations_between(before: Array, now: Array) -> Array:
+    """Return rotation vectors from some quaternions of nodes to others; (n, 3); rad."""
+    return np.asarray((_rotations(before).inv() * _rotations(now)).as_rotvec())
+
+
 def rotation_vectors(turns: Array) -> Array:
     """Return rotation vectors, of angles up to π; (n, 3); rad."""
     return np.asarray(_rotations(turns).as_rotvec())
