@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from test_space import EXACT, KINDS, LAWS, TURNS, crane, in_plane, in_space, same_motion
+from test_space import EXACT, KINDS, LAWS, TURNS, crane, flight, in_plane, in_space, same_motion
 
 import ufl_beam as ub
 
@@ -159,3 +159,42 @@ def test_order_4_is_refused_for_scenes_that_dissipate():
     scene = in_space(TURNS[1], connectors=lambda *ends: [KINDS["Slide"](*ends, LAWS["damper"])])
     with pytest.raises(ub.ModelError, match="dissipates"):
         ub.simulate(scene, ub.EnergyMomentum(order=4), t=(0, 1), dt=0.1, progress=False)
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.1, 0.2])
+def test_drift_of_a_flight(dt):
+    """Energy and momenta of a beam that tumbles in space for 1000 steps."""
+    first = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=dt, progress=False)
+    arguments = {"t": (5, 5 + 1000 * dt), "dt": dt, "newton": EXACT, "progress": False}
+    run = ub.simulate(first.scene, ub.EnergyMomentum(), start=first, **arguments)
+    momentum = run.momentum()[:, 3:]
+    for values in (run.energy.total, momentum):
+        assert np.abs(values - values[0]).max() < 1e-12 * np.linalg.norm(values[0])
+
+
+def test_drift_of_many_turns():
+    """20 000 steps about the centre of mass, of which many nodes turn a thousand times."""
+    scene = flight()
+    away = ub.Velocity(scene.beams, linear=(-5, 0, 0), angular=(0, 0, 0))  # the load stops it
+    scene = ub.Scene(scene.beams, loads=scene.loads, initial=[away])
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 5), dt=0.1, progress=False)
+    arguments = {"t": (5, 2005), "dt": 0.1, "newton": EXACT, "progress": False}
+    run = ub.simulate(scene, ub.EnergyMomentum(), start=first, **arguments)
+    for values in (run.energy.total, run.momentum()[:, 3:]):
+        assert np.abs(values - values[0]).max() < 1e-12 * np.linalg.norm(values[0])
+
+
+def test_a_step_turns_a_node_by_two_radians():
+    """The limit is 120 degrees; a body in fast rotation, whose steps are divided above it."""
+    for spin, substeps in ((200.0, 100), (300.0, 100), (400.0, 200)):
+        body = ub.Body((0, 0, 0), mass=1.0, inertia=(1, 2, 2.5), name="top")
+        start = ub.Velocity([body], angular=(0, 0, spin), linear=(0, 0, 0), about=(0, 0, 0))
+        scene = ub.Scene(bodies=[body], initial=[start])
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+        assert run.substeps == substeps
+        assert run.energy.worst < 1e-10
+    with pytest.raises(ub.ConvergenceError, match=r"top turns by 1\d\d° in the step"):
+        ub.simulate(
+            scene, ub.EnergyMomentum(), t=(0, 1), dt=ub.Adaptive(1.0, first=0.1, shortest=0.05),
+            progress=False,
+        )  # fmt: skip
