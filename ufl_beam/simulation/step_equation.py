@@ -307,8 +307,8 @@ class StepEquation:
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         step = Step.create(self.scheme, 0.0, short, short, q)
-        self.begin(step._replace(fraction=0.0), self.beams)  # imposed strains remain
-        for beam in self.beams:
+        self.begin(step._replace(fraction=0.0), self._predicting)  # imposed strains remain
+        for beam in self._predicting:
             beam.add_residual(q, forces)
         if t is not None:
             step = Step.create(self.scheme, t, t + 1.0, t + 1.0, q)

@@ -466,15 +466,12 @@ class Stepper(StateView):
         if failure == lib.TURNS_TOO_FAR and self.scene.in_space:
             rotations = self.subdomain.rotations
             vectors = self._copy(c.s)[rotations].reshape(-1, 3)
-            largest = rotations[3 * int(np.argmax(np.hypot.reduce(vectors.T)))]
-            place, slower = (
-                self.numbering.describe(int(largest)).split(" of ", 1)[1],
-                math.sqrt(1 / 3),
-            )
+            largest = int(rotations[3 * int(np.argmax(np.hypot.reduce(vectors.T)))])
+            angle, wanted = 2 * math.atan(c.turn / 2), 2 * math.tan(math.pi / 6)
             raise StepFailed(
-                f"{place} turns by {math.degrees(2 * math.atan(c.turn / 2)):.0f}° in the step, more "
-                f"than the limit of 120°; with dt = {2 * slower * c.step.dt / c.turn:.1e} s it would "
-                "turn by about 60°"
+                f"{self.numbering.describe(largest).split(' of ', 1)[1]} turns by "
+                f"{math.degrees(angle):.0f}° in the step, more than the limit of 120°; with dt = "
+                f"{wanted / c.turn * c.step.dt:.1e} s it would turn by about 60°"
             )
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
