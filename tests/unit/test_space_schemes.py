@@ -225,26 +225,86 @@ def test_start_in_statics_changes_no_bit(scheme):
     assert (whole.displacement(beam.end)[4:] == second.displacement(beam.end)).all()
 
 
-@pytest.mark.parametrize("joint", ["revolute", "prismatic", "link"])
+AT, AXIS = (0.3, 0.7, 0.2), (0.36, 0.48, 0.8)
+JOINTS = {
+    "revolute": lambda beam, ball: ub.Revolute(beam.end, ball.at(*AT), axis=AXIS),
+    "prismatic": lambda beam, ball: ub.Prismatic(beam.end, ball.at(*AT), axis=AXIS),
+    "link": lambda beam, ball: ub.Link(beam.end, ball.middle),
+}
+
+
+@pytest.mark.parametrize("joint", JOINTS)
 def test_small_loads_on_joints_at_rest(joint):
     """Constraints have all digits of small motions: a load of 1e-9 N moves as one of 1 N does."""
     tips = []
     for size in (1.0, 1e-9):
-        at, axis = np.array([0.3, 0.7, 0.2]), (0.36, 0.48, 0.8)
-        beam = ub.Beam((0, 0, 0), tuple(at), ub.Section(**STIFF, **OTHER), cells=2)
+        beam = ub.Beam((0, 0, 0), AT, ub.Section(**STIFF, **OTHER), cells=2)
         ball = ub.Body((0.8, 0.9, 0.1), mass=1.0, inertia=TENSOR)
-        joints = {
-            "revolute": lambda: ub.Revolute(beam.end, ball.at(*at), axis=axis),
-            "prismatic": lambda: ub.Prismatic(beam.end, ball.at(*at), axis=axis),
-            "link": lambda: ub.Link(beam.end, ball.middle),
-        }
         load = ub.PointLoad(ball.middle, force=(0, size, 2 * size), amplitude=lambda t: t)
         scene = ub.Scene(
-            [beam], bodies=[ball], joints=[joints[joint]()], supports=[ub.Clamped(beam.start)],
-            loads=[load],
+            [beam], bodies=[ball], joints=[JOINTS[joint](beam, ball)],
+            supports=[ub.Clamped(beam.start)], loads=[load],
         )  # fmt: skip
         run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.04), dt=0.01, progress=False)
         assert run.substeps == 4
         tips.append(run.displacement(ball.middle)[-1, :3] / size)
     # The motion under 1 N is 1e-5 m; what is nonlinear in it is that part of it.
     assert np.abs(tips[0] - tips[1]).max() < 1e-3 * np.abs(tips[0]).max()
+
+
+SLENDER = 1e2, 1e4, 1e6
+
+
+def rod(slenderness):
+    """A steel rod of 1 m, and its section."""
+    d, E, G, rho = 1 / slenderness, 210e9, 81e9, 7850.0
+    A, I = np.pi * d**2 / 4, np.pi * d**4 / 64
+    section = ub.Section(
+        EA=E * A, GA=0.9 * G * A, GA3=0.9 * G * A, EI=E * I, EI2=E * I, GJ=2 * G * I,
+        rhoA=rho * A, rhoI=rho * I, rhoI2=rho * I,
+    )  # fmt: skip
+    beam = ub.Beam((0, 0, 0), (1, 0, 0), section, cells=8, name="rod")
+    return beam, section
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentumStatic()], ids=str)
+@pytest.mark.parametrize("slenderness", SLENDER)
+def test_slender_rods(slenderness, scheme):
+    """Forces that bend the rod far; its axial stiffness is up to 1e13 times that of bending."""
+    beam, section = rod(slenderness)
+    force = (0, section.EI, section.EI)
+    load = ub.PointLoad(beam.end, force=force, amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.1, progress=False)
+    assert run.energy.worst < 1e-9
+    if not scheme.dynamic:
+        assert np.linalg.norm(run.displacement(beam.end)[-1, :3]) > 0.3
+
+
+@pytest.mark.parametrize("spin", [(0, 1e3, 10), (1e3, 10, 0), (300, 400, 500)], ids=str)
+def test_fast_spins(spin):
+    """Steps of ten radians are divided."""
+    beam, _ = rod(20)
+    start = ub.Velocity([beam], angular=spin, linear=(0, 0, 0), about=(0.5, 0, 0))
+    scene = ub.Scene([beam], initial=[start])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, progress=False)
+    assert run.substeps > 10
+    assert run.energy.worst < 1e-9
+
+
+@pytest.mark.filterwarnings("ignore:rod. its section is:ufl_beam.ModelWarning")
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+@pytest.mark.parametrize("name", ["EA", "GA", "GJ", "EI2", "rhoA", "rhoI"])
+def test_ratios_of_stiffness_and_mass(name, factor):
+    """Each run closes its ledger, or ends with an error that names a cell."""
+    beam, section = rod(20)
+    values = {x: getattr(section, x) * (factor if x == name else 1.0) for x in STIFF | OTHER}
+    beam = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**values), cells=8, name="rod")
+    load = ub.PointLoad(beam.end, force=(0, 1e3, 1e3))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    try:
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01, progress=False)
+    except ub.ConvergenceError as error:
+        assert "A cell, rod at (" in str(error)
+        run = error.solution
+    assert run.energy.worst < 1e-9

@@ -65,9 +65,8 @@ def strains_in_space(fields: Fields, q: Array, turns: Array) -> Array:
     numbering, (lengths, axes) = fields.subdomain.numbering, cell_axes(fields)
     a, b = numbering.cells.T
     at = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
-    first, second = _rotations(turns[a]), _rotations(turns[b])
-    between = (first.inv() * second).as_rotvec()
-    middle = first * Rotation.from_rotvec(between / 2)
+    between = rotations_between(turns[a], turns[b])
+    middle = _rotations(turns[a]) * Rotation.from_rotvec(between / 2)
     slope = middle.inv().apply((at[b] - at[a]) / lengths[:, None])
     both = (np.einsum("nik,ni->nk", axes, x) for x in (slope, between / lengths[:, None]))
     return np.asarray(np.hstack([*both]) - np.eye(6)[0])
@@ -95,13 +94,19 @@ def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) ->
         body = numbering.scene.rigid_bodies.index(place.body)
         return _rotations(turns[:, len(numbering.points) + body])
     nodes, weights = numbering.weights(place)
-    a, b = (_rotations(turns[:, node]) for node in nodes)
-    return a * Rotation.from_rotvec(weights[1] * (a.inv() * b).as_rotvec())
+    a, b = (turns[:, node] for node in nodes)
+    return _rotations(a) * Rotation.from_rotvec(weights[1] * rotations_between(a, b))
 
 
 def rotations_between(before: Array, now: Array) -> Array:
-    """Return rotation vectors from some quaternions of nodes to others; (n, 3); rad."""
-    return np.asarray((_rotations(before).inv() * _rotations(now)).as_rotvec())
+    """Return rotation vectors from some quaternions of nodes to others, up to 2 π; (n, 3); rad.
+
+    The sign of a quaternion tells rotations beyond π from those in the other direction.
+    """
+    (a, p), (b, q) = ((1 + x[:, :1], x[:, 1:]) for x in (before, now))
+    v, real = a * q - b * p - np.cross(p, q), a * b + np.sum(p * q, axis=1, keepdims=True)
+    sine = np.linalg.norm(v, axis=1, keepdims=True)
+    return np.asarray(v * 2 * np.arctan2(sine, real) / np.where(sine > 0, sine, 1.0))
 
 
 def rotation_vectors(turns: Array) -> Array:
