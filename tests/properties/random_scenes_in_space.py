@@ -132,7 +132,8 @@ class _Writer:
     def _connector(self, *, free):
         a, b = self._anchor(), self._anchor()
         to_ground = not free and self._chance(0.5)
-        if a.part is b.part and not to_ground:
+        held = to_ground and not np.any(b.point)  # perhaps by the support
+        if held or (a.part is b.part and not to_ground):
             return
         if to_ground:
             point = b.point + self._vector()

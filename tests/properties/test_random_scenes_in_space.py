@@ -94,7 +94,10 @@ def check(seed):
     assert (gap := gaps(one, solution)) < KEPT, f"gap {gap:.1e}"
     if one.free:
         p = solution.momentum()
-        size = np.abs(p).max() + 1e-300
+        lengths = (np.linalg.norm(np.subtract(*beam.ends)) for beam in one.scene.beams)
+        masses = [b.section.rhoA * x for b, x in zip(one.scene.beams, lengths, strict=True)]
+        mass = sum(masses) + sum(body.mass for body in one.scene.bodies)
+        size = np.abs(p).max() + mass * np.abs(solution.v).max() * one.scene.size + 1e-300
         exact = slice(None) if not isinstance(one.scheme, ub.EnergyMomentumDecaying) else slice(3)
         drift = np.abs(p - p[0])[:, exact].max() / size
         assert drift < 1e-9, f"momenta drift by {drift:.1e}"

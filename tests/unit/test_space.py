@@ -505,7 +505,6 @@ def refused():
         "follow": lambda: ub.follow(scene, control, steps=1),
         "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),
         "section forces": lambda: run.section_forces_at(BEAM.end),
-        "reference": lambda: ub.simulate(scene, **dynamic, newton=ub.Newton(reference=True)),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.mesh,
     }
 
