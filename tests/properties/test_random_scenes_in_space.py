@@ -108,7 +108,7 @@ def check(seed):
     assert not words, f"with start=: {words}"
     again = np.abs(motion(one, second)[:, -1] - motion(one, solution)[:, -1]).max()
     # Springs begin with motions that are computed again, from unit quaternions
-    assert again <= (1e-11 if one.scene.connectors else 0.0), f"start= differs by {again:.1e}"
+    assert again <= (SAME if one.scene.connectors else 0.0), f"start= differs by {again:.1e}"
     with tempfile.TemporaryDirectory() as folder:
         backup, half = ub.Checkpoint(f"{folder}/run.h5", every=1), STEPS / 2 * one.dt
         run(one, checkpoint=backup, until=lambda now: now.t >= half)

@@ -258,7 +258,7 @@ class Block(LoadTerm):
         made, unknowns = self._kernels, len(self.statement.unknowns)
         entries = np.array(made.entries, dtype=int).reshape(-1, 2)
         all_dofs = np.reshape(self._elements.dofs, (-1, unknowns))
-        inputs = np.ascontiguousarray(self.by_element(self._w))
+        inputs: list[Array] = [*np.ascontiguousarray(self.by_element(self._w))]
         for dofs, w in zip(all_dofs, inputs, strict=True):
             w[:unknowns] = q[dofs]
             if self.statement.inserts and self.statement.modes:  # the latest tangent is at q

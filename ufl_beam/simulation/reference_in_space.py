@@ -18,7 +18,6 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block
-from ufl_beam.compiled.c_library import doubles, lib
 from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.mechanics.time_scheme import Step, has_inertia, stages_of
 from ufl_beam.simulation.simulation import Simulation
@@ -63,8 +62,9 @@ class ReferenceInSpace(Simulation):
         while done < MOST_SUBSTEPS:
             last = done + some == MOST_SUBSTEPS
             t1 = end if last else begin + (end - begin) * (done + some) / MOST_SUBSTEPS
+            row: Array = np.zeros((1, self._writer.columns.width))
             try:
-                self._take(np.array([[t1, end, 0.0]]), self._solve(t1, end))
+                self._accept_given(np.array([t1, end, 0.0]), self._solve(t1, end), row)
                 done += some
             except StepFailed as failure:
                 if some == 1:
@@ -73,13 +73,6 @@ class ReferenceInSpace(Simulation):
         if keep:
             self.keep()
         return 1
-
-    def _take(self, step: Array, q1: Array) -> None:
-        row: Array = np.zeros((1, self._writer.columns.width))
-        with self._in_c():
-            taken = lib.repeat_steps(self.time_loop, 1, doubles(step), doubles(q1), doubles(row))
-        if not taken:
-            self._fail()
 
     def _solve(self, t1: float, end: float) -> Array:
         """Return the configuration at the end of a step."""
@@ -92,7 +85,7 @@ class ReferenceInSpace(Simulation):
         change = last = np.inf
         for _ in range(self.newton.max_iterations):
             r, K, size = self._equation(x)
-            left = np.linalg.norm((equation.weights * r)[free])
+            left = float(np.linalg.norm((equation.weights * r)[free]))
             if change <= SMALL_CHANGE and (left <= self.newton.rtol * size or left > last / 2):
                 return x  # to the tolerance, or to round-off
             last = left
@@ -102,7 +95,7 @@ class ReferenceInSpace(Simulation):
                 raise StepFailed("the tangent is singular") from None
             x[free] -= step
             equation.c.total += 1
-            change = np.abs(step * scales[free]).max(initial=0.0)
+            change = float(np.abs(step * scales[free]).max(initial=0.0))
         raise StepFailed(f"Newton's method changes the iterate by {change:.1e} without an end")
 
     def _equation(self, x: Array) -> tuple[Array, Any, float]:

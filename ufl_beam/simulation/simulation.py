@@ -342,17 +342,22 @@ class Simulation(Stepper):
                 space = self.solution.free_rows(columns, number)
             else:
                 space = np.zeros((number, columns.width))
-            with self._in_c():
-                arrays = doubles(steps[done:]), doubles(configurations[done:]), doubles(space)
-                taken: int = lib.repeat_steps(self.time_loop, len(space), *arrays)
-            if taken < len(space):
-                self._fail()
+            self._accept_given(steps[done:], configurations[done:], space)
+            taken = len(space)
             if whole:
                 self.solution.grow(taken)
                 self.solution.count(self.substeps, self.iterations)
             else:
                 self.keep()
             done += taken
+
+    def _accept_given(self, steps: Array, configurations: Array, rows: Array) -> None:
+        """Accept as many given configurations as there are ``rows``, which get the states."""
+        with self._in_c():
+            arrays = doubles(steps), doubles(configurations), doubles(rows)
+            taken: int = lib.repeat_steps(self.time_loop, len(rows), *arrays)
+        if taken < len(rows):
+            self._fail()
 
     def watch(self, fractions: Array) -> ExtremesInC:
         """Return extremes of motions, and of section forces at ``fractions`` of cells.
