@@ -8,7 +8,7 @@ of the ledger, section forces, derivatives of runs, and restart.  The loops are 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -107,6 +107,15 @@ class Elements(NamedTuple):
     force_kind: int = lib.DENSITY
     groups: npt.ArrayLike = 0
     number_of_groups: int = 0
+
+
+def called(function: Any, w: Array) -> Array:
+    """Return the outputs of a compiled function of an element; none of no function."""
+    out: Array = np.zeros(function.outputs if function else 0)
+    if function:
+        unused = [ffi.NULL] * (len(ffi.typeof(function.one).args) - 4)
+        function.one(doubles(out), doubles(w), ffi.NULL, doubles(np.eye(1, 6, 3)[0]), *unused)
+    return out
 
 
 class Block(LoadTerm):
@@ -240,6 +249,23 @@ class Block(LoadTerm):
         entries = self._A.positions(dofs[:, i].ravel(), dofs[:, j].ravel()).astype(np.int32)
         return integers(in_batches(entries.reshape(len(dofs), len(i)), BATCH))
 
+    def each_element(self, q: Array) -> Iterator[tuple[Index, Array, Array, Array]]:
+        """Yield degrees of freedom, forces, and positions and values of the tangent at ``q``.
+
+        This is the plain loop of the reference solver: one call of a kernel for an element.  The
+        branches of laws are those of the latest residual.
+        """
+        made, unknowns = self._kernels, len(self.statement.unknowns)
+        entries = np.array(made.entries, dtype=int).reshape(-1, 2)
+        all_dofs = np.reshape(self._elements.dofs, (-1, unknowns))
+        inputs: list[Array] = [*np.ascontiguousarray(self.by_element(self._w))]
+        for dofs, w in zip(all_dofs, inputs, strict=True):
+            w[:unknowns] = q[dofs]
+            if self.statement.inserts and self.statement.modes:  # the latest tangent is at q
+                w[-unknowns - 2 :] = [*q[dofs], 1.0, 1.0]
+            forces = called(made.force, w)[:unknowns]
+            yield dofs, forces, entries, called(made.tangent, w)
+
     def freeze(self) -> None:
         """Keep the internal variables constant from now on."""
         made = kernels(self.statement.frozen)
@@ -367,10 +393,10 @@ class Block(LoadTerm):
         if archive.has(f"time of {name}"):
             self.start(q)
 
-    def keep_states(self, archive: Archive, first: int = 0) -> None:
-        """Save or restore the states of the elements, without the first ones."""
-        if number := len(self.statement.state) - first:
-            indices, states = self._elements.indices, self._states[:, first:]
+    def keep_states(self, archive: Archive, first: int = 0, last: int | None = None) -> None:
+        """Save or restore the states of the elements from the first to the last one."""
+        if number := len(self.statement.state[first:last]):
+            indices, states = self._elements.indices, self._states[:, first:last]
             rows = states.transpose(0, 2, 1).reshape(-1, number)[: len(indices)]
             states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
 

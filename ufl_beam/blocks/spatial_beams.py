@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from ufl_beam.discretization.cells_in_space import (
 )
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.spatial_kinematics import (
     Middle,
     Turn,
@@ -71,9 +73,31 @@ class StatementInSpace(Statement):
         """Quaternions of the nodes."""
         return [x for k in range(self.nodes) for x in quaternion_names(k)]
 
+    def spin(self, at: Inputs, k: int) -> Vector:
+        """Return the angular velocity of a node after the step."""
+        known = [change(at, "abc", k)]
+        known += [vector(at, f"rate{j + 1}", "abc", k) for j in range(self.rates)]
+        parts = [scale(at[f"rates 0 {j}"], x) for j, x in enumerate(known)]
+        return reduce(add, parts)
+
 
 @dataclass(frozen=True)
-class ElasticCellInSpace(StatementInSpace):
+class InertiaInSpace(StatementInSpace):
+    """Statement on nodes in space with inertia in dynamics."""
+
+    @property
+    def rates(self) -> int:
+        """Number of rates: velocities and, if the scheme needs them, those before the last step."""
+        return 1 + self.scheme.uses_last_step if has_inertia(self.scheme) else 0
+
+    @property
+    def of_step(self) -> list[str]:
+        """Length of the step, and coefficients of its rates."""
+        return ["dt", *(f"rates 0 {j}" for j in range(1 + self.rates))] if self.rates else []
+
+
+@dataclass(frozen=True)
+class ElasticCellInSpace(InertiaInSpace):
     """Elastic cell of two nodes; in dynamics with the moments of its rotating inertia.
 
     The inertia of the scene is a constant matrix in velocities in axes of the nodes.  The momentum
@@ -84,9 +108,9 @@ class ElasticCellInSpace(StatementInSpace):
     inserts = True
 
     @property
-    def rates(self) -> int:
-        """Number of rates, which are velocities in dynamics."""
-        return int(has_inertia(self.scheme))
+    def state(self) -> list[str]:
+        """Quaternions of the nodes; changes of strains in the last step, and its length (s)."""
+        return [*super().state, *LAST_CHANGES * bool(self.scheme.lost_fraction)]
 
     @property
     def modes(self) -> list[str]:
@@ -97,16 +121,11 @@ class ElasticCellInSpace(StatementInSpace):
     @property
     def numbers(self) -> list[str]:
         """Stiffnesses, "alpha", length and axes of the cell, rotary inertia."""
-        inertia = [f"J{i}{j}" for i in range(3) for j in range(3)] * self.rates
+        inertia = [f"J{i}{j}" for i in range(3) for j in range(3)] * bool(self.rates)
         return [
             *STIFFNESS_IN_SPACE, *["alpha"] * bool(self.scheme.alpha), "h",
             *(f"R{i}{j}" for i in range(3) for j in range(3)), *inertia,
         ]  # fmt: skip
-
-    @property
-    def of_step(self) -> list[str]:
-        """Length of the step, and coefficients of its rates."""
-        return ["dt", "rates 0 0", "rates 0 1"] if has_inertia(self.scheme) else []
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
@@ -124,6 +143,20 @@ class ElasticCellInSpace(StatementInSpace):
         own, predicted = self._resultants(at, C, e0, e1), [None] * 6
         if not self.rates:
             predicted = self._resultants(at, C, e0, self._predicted(at, q0, u[0], axes))
+        growth = [now - before for before, now in zip(e0, e1, strict=True)]
+        state, lost = new_state(turns), dict[str, Expr]()
+        if self.scheme.alpha:
+            work = sum(C[i] * growth[i] ** 2 for i in range(6))
+            lost["numerical"] = at["alpha"] * h * work
+        if self.scheme.lost_fraction:  # see SecondDifferences of damping.py
+            *before, last_dt = (at[name] for name in LAST_CHANGES)
+            ratio = ufl.conditional(ufl.lt(at["dt"], last_dt), at["dt"] / last_dt, 1.0)
+            triples = zip(C, growth, before, strict=True)
+            f = ufl.as_ufl(self.scheme.lost_fraction)
+            damping = [f * c * (x - ratio * y) for c, x, y in triples]
+            own = [x + y for x, y in zip(own, damping, strict=True)]
+            lost["numerical"] = h * sum(x * y for x, y in zip(damping, growth, strict=True))
+            state |= zip(LAST_CHANGES, [*growth, at["dt"]], strict=True)
         r = [at.stage(x, in_tangent=y) for x, y in zip(own, predicted, strict=True)]
         pair, tangents = turns, [add(transposed_times(axes, FIRST), slope) for slope in slopes]
         if at_end:
@@ -138,9 +171,7 @@ class ElasticCellInSpace(StatementInSpace):
         forces = [x for i in range(3) for x in (-N[i], N[i])]
         forces += [x for both in zip(*on_nodes, strict=True) for x in both]
         stored = h / 2 * sum(C[i] * e1[i] ** 2 for i in range(6))
-        growth = sum(C[i] * (e1[i] - e0[i]) ** 2 for i in range(6))
-        lost = {"numerical": at["alpha"] * h * growth} if self.scheme.alpha else {}
-        return Equations(forces, new_state(turns), {"stored": stored}, lost)
+        return Equations(forces, state, {"stored": stored}, lost)
 
     def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
         found = list[Expr]()
@@ -169,12 +200,7 @@ class ElasticCellInSpace(StatementInSpace):
 
     def _turning(self, at: Inputs, own: Sequence[Vector]) -> list[Vector]:
         """Return the moments by which the momenta of the nodes turn."""
-        J, momenta = _matrix(at, "J"), list[Vector]()
-        for k, m in enumerate(own):
-            before = vector(at, "rate1", "abc", k)
-            ω = add(scale(at["rates 0 0"], m), scale(at["rates 0 1"], before))
-            momenta.append(times(J, ω))
-        found = list[Vector]()
+        momenta, found = [times(_matrix(at, "J"), self.spin(at, k)) for k in (0, 1)], list[Vector]()
         for k, m in enumerate(own):
             sums = add(scale(2.0, momenta[k]), momenta[1 - k])
             P = tuple(map(at.stage, scale(at["h"] / 6, sums)))
@@ -185,6 +211,9 @@ class ElasticCellInSpace(StatementInSpace):
 def _same(x: Expr) -> Expr:
     return x
 
+
+LAST_CHANGES = *(f"change {k}" for k in range(6)), "last dt"
+"""States of :class:`~ufl_beam.EnergyMomentumDecaying`: changes of strains, length of the step."""
 
 FIRST = 1.0, 0.0, 0.0
 """Axis 1 of a cell, in its axes."""
@@ -224,6 +253,7 @@ class CellsInSpace(Block):
         )  # fmt: skip
         super().__init__(ElasticCellInSpace(alike(scheme)), elements, setting, kind="beams")
         self.in_cells, self.prediction = [], None
+        self.forget_last_step()
         if not has_inertia(scheme):
             self.prediction = struct("predicted_forces")
             fill(self._c, predicted=self.prediction)
@@ -240,6 +270,18 @@ class CellsInSpace(Block):
     def states(self) -> Array:
         """States of all cells, in batches."""
         return self._states
+
+    def forget_last_step(self) -> None:
+        """Let the next step not depend on changes of strains in the last one."""
+        if "last dt" in self.state:
+            self.state["last dt"][:] = np.inf
+
+    def keep_states(self, archive: Archive, first: int = 0, last: int | None = None) -> None:
+        """See the base class; quaternions, which all schemes have, are a table of their own."""
+        quaternions = 4 * self.statement.nodes
+        super().keep_states(archive, 0, quaternions)
+        if not archive.restores or archive.has(f"{self._elements.name}, {len(LAST_CHANGES)}"):
+            super().keep_states(archive, quaternions)
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """See the base class."""
@@ -271,21 +313,11 @@ def turned_momentum(m: Vector, P: Vector, dt: Expr) -> Vector:
 
 
 @dataclass(frozen=True)
-class TurningBody(StatementInSpace):
+class TurningBody(InertiaInSpace):
     """Moment of the turning momentum of a body, besides its inertia; it has no power."""
 
     nodes = 1
     numbers = tuple(f"J{i}{j}" for i in range(3) for j in range(3))
-
-    @property
-    def rates(self) -> int:
-        """Number of rates, which are velocities in dynamics."""
-        return int(has_inertia(self.scheme))
-
-    @property
-    def of_step(self) -> list[str]:
-        """Length of the step, and coefficients of its rates."""
-        return ["dt", "rates 0 0", "rates 0 1"] if self.rates else []
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
@@ -294,9 +326,7 @@ class TurningBody(StatementInSpace):
         state = new_state([Turn(at.stage, m, quaternion(at, 0))])
         if not self.rates:
             return Equations([*none, *none], state)
-        before = vector(at, "rate1", "abc", 0)
-        ω = add(scale(at["rates 0 0"], m), scale(at["rates 0 1"], before))
-        P = tuple(sum(at[f"J{i}{j}"] * ω[j] for j in range(3)) for i in range(3))
+        P = times(_matrix(at, "J"), self.spin(at, 0))
         return Equations([*none, *turned_momentum(m, P, at["dt"])], state)
 
 

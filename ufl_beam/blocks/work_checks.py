@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
+from ufl_beam.blocks.block import called
 from ufl_beam.blocks.effect_blocks import OfPython, computed
 from ufl_beam.blocks.statement import Statement, kernels
 from ufl_beam.blocks.works import (
@@ -20,7 +20,6 @@ from ufl_beam.blocks.works import (
     statement_of,
     values_at_zero,
 )
-from ufl_beam.compiled.c_library import doubles, ffi
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -120,8 +119,8 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
             )  # fmt: skip
             return f.T.ravel(), np.r_[new, f.ravel()][:states], np.array([*of.values()])
         w = np.array([*q1, *q0, *z, *of_places, dt, *numbers])
-        end = _called(made.end, w)
-        return _called(made.force, w)[:n], end[:states], end[states:]
+        end = called(made.end, w)
+        return called(made.force, w)[:n], end[:states], end[states:]
 
     rest = step(np.zeros(n), np.zeros(n), initial_state(statement), 1.0)[0]
     finite = bool(np.isfinite(rest).all())
@@ -169,12 +168,3 @@ def require_explained(effect: Effect, statement: OfUser, scene: Scene) -> None:
 def _slope(statement: OfUser, turn: float) -> float:
     """Return the factor of the virtual rotation in a step in which a node turns."""
     return float(statement.scheme.virtual_rotation(*map(ufl.as_ufl, (0.0, float(turn), 1.0))))
-
-
-def _called(function: Any, w: Array) -> Array:
-    """Return the outputs of a compiled function of an element."""
-    out = np.zeros(function.outputs if function else 0)
-    if function:
-        unused = [ffi.NULL] * (len(ffi.typeof(function.one).args) - 4)
-        function.one(doubles(out), doubles(w), ffi.NULL, doubles(np.eye(1, 6, 3)[0]), *unused)
-    return out

@@ -90,9 +90,9 @@ class CellsOfState(NamedTuple):
         lengths, axes = undeformed
         a, b = numbering.cells.T
         at = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
-        first, second = _rotations(turns[a]), _rotations(turns[b])
+        first = _rotations(turns[a])
         slopes = (at[b] - at[a]) / lengths[:, None]
-        return cls(slopes, first, (first.inv() * second).as_rotvec(), lengths, axes)
+        return cls(slopes, first, rotations_between(turns[a], turns[b]), lengths, axes)
 
     def frames(self, fraction: float) -> Rotation:
         """Return the rotations of the cross-sections at a fraction of the cells."""
@@ -169,8 +169,19 @@ def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) ->
         body = numbering.scene.rigid_bodies.index(place.body)
         return _rotations(turns[:, len(numbering.points) + body])
     nodes, weights = numbering.weights(place)
-    a, b = (_rotations(turns[:, node]) for node in nodes)
-    return a * Rotation.from_rotvec(weights[1] * (a.inv() * b).as_rotvec())
+    a, b = (turns[:, node] for node in nodes)
+    return _rotations(a) * Rotation.from_rotvec(weights[1] * rotations_between(a, b))
+
+
+def rotations_between(before: Array, now: Array) -> Array:
+    """Return rotation vectors from some quaternions of nodes to others, up to 2 π; (n, 3); rad.
+
+    The sign of a quaternion tells rotations beyond π from those in the other direction.
+    """
+    (a, p), (b, q) = ((1 + x[:, :1], x[:, 1:]) for x in (before, now))
+    v, real = a * q - b * p - np.cross(p, q), a * b + np.sum(p * q, axis=1, keepdims=True)
+    sine = np.linalg.norm(v, axis=1, keepdims=True)
+    return np.asarray(v * 2 * np.arctan2(sine, real) / np.where(sine > 0, sine, 1.0))
 
 
 def rotation_vectors(turns: Array) -> Array:

@@ -143,13 +143,12 @@ class Subdomain:
         """Rotations in the plane; none in space, where unknowns are Cayley vectors."""
         return self.rotations[: 0 if self.numbering.scene.in_space else None]
 
-    def translations(self) -> tuple[Index, Index]:
-        """Return the local numbers of u, and of v, of all nodes and bodies on this process."""
-        numbering = self.numbering
-        pairs = np.unique(np.r_[numbering.dofs[:, :2], numbering.dofs_of_bodies[:, :2]], axis=0)
-        indices = self._local[pairs]
-        x, y = indices[(indices >= 0).all(axis=1)].T
-        return x, y
+    def translations(self) -> Index:
+        """Return the local numbers of the displacements of all nodes and bodies, (2 or 3, n)."""
+        numbering, d = self.numbering, self.numbering.displacements
+        rows = np.unique(np.r_[numbering.dofs[:, :d], numbering.dofs_of_bodies[:, :d]], axis=0)
+        indices = self._local[rows]
+        return np.asarray(indices[(indices >= 0).all(axis=1)].T)
 
     def lengths(self) -> Array:
         """Return the change of each local degree of freedom by a strain of 1; m, rad; 0 for forces.

@@ -342,6 +342,10 @@ class States:
             motion[:, 3:] = rotation_vectors(self._row(TURNS, n)[: len(motion)])
         return motion
 
+    def turns(self, n: int) -> Array:
+        """Return the quaternions of nodes and bodies in space, see ``TURNS``; (nodes, 4)."""
+        return self._row(TURNS, n)
+
     def velocity(self, place: AttachmentPoint) -> Array:
         """Return the velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
 

@@ -86,6 +86,8 @@ def checked_numbering(
             require_no_prestress(scene, repr(scheme), instead)
     if scene.in_space:
         require_for_space(scheme)
+        if len(stages_of(scheme)) > 1:
+            require_smooth(scene, scheme)
         warn_of_warping(scene)
         return DofNumbering(scene, mesh), ""
     require_works(scene, mesh.degree, scheme)
@@ -100,11 +102,11 @@ def checked_numbering(
 
 def require_for_space(scheme: Scheme) -> None:
     """Raise :class:`ModelError` for a scheme whose rotations are for the plane."""
-    moving = scheme.half_tangents and not scheme.lost_fraction if has_inertia(scheme) else True
-    if not moving or len(stages_of(scheme)) > 1:
+    if has_inertia(scheme) and not scheme.half_tangents:
         raise ModelError(
-            f"{scheme!r}: rotations in space need EnergyMomentum(), Static() or "
-            "EnergyMomentumStatic(); angles of other schemes cannot be added in space"
+            f"{scheme!r}: rotations in space need EnergyMomentum(), EnergyMomentumDecaying(), "
+            "Static() or EnergyMomentumStatic(): this scheme adds changes of angles and their "
+            "rates, and in space a sum of angles about changing axes is no rotation"
         )
 
 

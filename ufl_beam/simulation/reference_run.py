@@ -71,7 +71,6 @@ RATE = Connection._fields.index("rate")
 def require_scope(numbering: DofNumbering, scheme: Scheme, comm: MPI.Intracomm) -> None:
     """Raise :class:`ArgumentError` if the solver leaves out a part of the scene, or the scheme."""
     scene = numbering.scene
-    scene.require_plane("Newton(reference=True)")
     kinds = {id(kind): kind for kind, _ in numbering.inelastic}.values()
     sections = {beam.section for beam in scene.beams}
     several = [s for s in sections if len(s.section_points(s.hinge)) > 1]

@@ -44,6 +44,7 @@ from ufl_beam.simulation.initial_state import (
     mesh_of,
     require_scheme,
 )
+from ufl_beam.simulation.reference_in_space import ReferenceInSpace
 from ufl_beam.simulation.reference_run import ReferenceRun
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
@@ -169,7 +170,10 @@ def simulate(
             }  # fmt: skip
             keeper = CheckpointFile(checkpoint, call, step, t1, recorders, comm)
             stack.callback(keeper.lock.unlock)
-        kind: Any = ReferenceRun if by_reference else Simulation
+        kind: Any = Simulation
+        if by_reference:
+            in_space = isinstance(scene, Scene) and scene.in_space
+            kind = ReferenceInSpace if in_space else ReferenceRun
         simulation = kind(scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm)
         solution: Solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin

@@ -14,6 +14,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, give_back_memory, lib
+from ufl_beam.discretization.cells_in_space import rotations_between
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive, State
@@ -51,6 +52,9 @@ APPLYING = 1 / 8
 
 LONGEST = 0.05
 """Wall time after which C returns, so that a run can be interrupted and shows its progress; s."""
+
+BENT_FAR = math.pi / 2
+"""Rotation between the nodes of a cell in space from which on the error of a run blames it; rad."""
 
 MOST_VALUES = 2**20
 """Limit of the numbers that C stores in one call for states; at least one state is stored."""
@@ -338,17 +342,22 @@ class Simulation(Stepper):
                 space = self.solution.free_rows(columns, number)
             else:
                 space = np.zeros((number, columns.width))
-            with self._in_c():
-                arrays = doubles(steps[done:]), doubles(configurations[done:]), doubles(space)
-                taken: int = lib.repeat_steps(self.time_loop, len(space), *arrays)
-            if taken < len(space):
-                self._fail()
+            self._accept_given(steps[done:], configurations[done:], space)
+            taken = len(space)
             if whole:
                 self.solution.grow(taken)
                 self.solution.count(self.substeps, self.iterations)
             else:
                 self.keep()
             done += taken
+
+    def _accept_given(self, steps: Array, configurations: Array, rows: Array) -> None:
+        """Accept as many given configurations as there are ``rows``, which get the states."""
+        with self._in_c():
+            arrays = doubles(steps), doubles(configurations), doubles(rows)
+            taken: int = lib.repeat_steps(self.time_loop, len(rows), *arrays)
+        if taken < len(rows):
+            self._fail()
 
     def watch(self, fractions: Array) -> ExtremesInC:
         """Return extremes of motions, and of section forces at ``fractions`` of cells.
@@ -374,6 +383,16 @@ class Simulation(Stepper):
         self.end()
         local = [f"{said}." for said in self._force_watch.suspects(self.t)]
         suspects = dict.fromkeys(chain.from_iterable(self.subdomain.comm.allgather(local)))
+        if self.scene.in_space and len(cells := self.numbering.cells):
+            first, second = self.now.turns(0)[cells.T]
+            angles = np.linalg.norm(rotations_between(first, second), axis=1)
+            if (largest := angles.max()) > BENT_FAR:
+                bent = self.numbering.describe_cell(int(angles.argmax()))
+                advice = (
+                    f"A cell, {bent}, is bent or twisted by {np.degrees(largest):.0f}° between its "
+                    "nodes, where its strains are no approximation any more; give the beam more "
+                    "cells, or check its stiffness"
+                )
         raise no_equilibrium(
             self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
             " ".join([*suspects, advice or self.scheme.advice]), self._free_motion,

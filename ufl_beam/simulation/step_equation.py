@@ -247,6 +247,8 @@ class StepEquation:
         self.controllers.save_or_restore(archive, t)
         for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
             term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
+        for cells in () if same else self.in_space:
+            cells.forget_last_step()
         unknown = archive.unknown.copy()
         for load in self.loads:
             if isinstance(load, Block) and load.remembers:
@@ -265,7 +267,7 @@ class StepEquation:
         if self.inertia is not None and self.inertia.scheme.uses_last_step:
             self.inertia.pass_on_step(archive)
             for term in self.terms:
-                if isinstance(term, Block):
+                if isinstance(term, Block) and term not in self.in_space:
                     term.keep_states(archive)
 
     # -- forces and tangent --------------------------------------------------------------------
@@ -305,8 +307,8 @@ class StepEquation:
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         step = Step.create(self.scheme, 0.0, short, short, q)
-        self.begin(step._replace(fraction=0.0), self.beams)  # imposed strains remain
-        for beam in self.beams:
+        self.begin(step._replace(fraction=0.0), self._predicting)  # imposed strains remain
+        for beam in self._predicting:
             beam.add_residual(q, forces)
         if t is not None:
             step = Step.create(self.scheme, t, t + 1.0, t + 1.0, q)

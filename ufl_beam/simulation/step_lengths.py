@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.discretization.cells_in_space import rotations_between
 from ufl_beam.discretization.state_io import Archive, State
 from ufl_beam.errors import ConvergenceError, StepFailed, require_number, require_sequence
 from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
@@ -159,7 +160,6 @@ class AdaptiveSteps(Steps):
 
     def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
         super().__init__(simulation, t1)
-        simulation.scene.require_plane("dt = Adaptive(...)")
         t0 = simulation.t
         self._tolerance = control.tolerance
         self._longest = control.longest or t1 - t0
@@ -177,7 +177,8 @@ class AdaptiveSteps(Steps):
         self._stops = [*apart, t1]
         self._fresh = True
         subdomain = simulation.subdomain
-        self._rotations, (self._x, self._y) = subdomain.rotations, subdomain.translations()
+        self._rotations, self._translations = subdomain.rotations, subdomain.translations()
+        self._axes = 3 if simulation.scene.in_space else 1  # of a rotation
         M = simulation.inertia.M
         masses = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
         self._massless = np.flatnonzero(masses == 0.0)
@@ -249,7 +250,11 @@ class AdaptiveSteps(Steps):
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
         error = c2 * dt**2 * a + c3 * dt**3 * jerk
-        error[self._rotations] += (trial.q1 - simulation.q - trial.s)[self._rotations]
+        turned = self._rotations
+        if self._axes == 1:
+            error[turned] += (trial.q1 - simulation.q - trial.s)[turned]
+        else:
+            error[turned] += _error_of_vectors(trial.s[turned], dt**2 * a[turned])
         return trial, self._largest_error(error, simulation.t, dt)
 
     def _compare_velocities(self, t1: float) -> tuple[Trial, float]:
@@ -264,11 +269,16 @@ class AdaptiveSteps(Steps):
         dt, first = t1 - t, stages_of(simulation.scheme)[0]
         trial = simulation.attempt(t1)
         q_early = simulation.stage_end(0)
-        early = 2 / (first * dt) * nodal_step(simulation.scheme, q, q_early, self._rotations) - v
+        angles = simulation.subdomain.plane_rotations
+        early = 2 / (first * dt) * nodal_step(simulation.scheme, q, q_early, angles) - v
         late, last = inertia.v, inertia.after(trial.s, trial.step.dt)[0]
         inside = 1 / 12 / (1 / 4 - (1 / 2 - first) ** 2)
         ends = 1 / 2 - inside
         error = trial.q1 - q - dt * (ends * (v + last) + inside * (early + late))
+        if self._axes == 3:
+            between = map(simulation.stage_end, range(len(stages_of(simulation.scheme)) - 2))
+            for a, b in pairwise([q, *between, simulation.q, trial.q1]):
+                error[self._rotations] += _error_of_vectors((b - a)[self._rotations])
         return trial, self._largest_error(error, t, dt)
 
     def _largest_error(self, error: Array, t: float, dt: float) -> float:
@@ -288,9 +298,10 @@ class AdaptiveSteps(Steps):
 
     def size_of(self, motion: Array) -> float:
         """Return the largest displacement, in sizes of the scene, or rotation; rad."""
-        moves = np.hypot(motion[self._x], motion[self._y]).max(initial=0.0)
-        rotations = np.abs(motion[self._rotations]).max(initial=0.0)
-        largest = float(max(moves / self._simulation.scene.size, rotations))
+        moves = np.hypot.reduce(motion[self._translations]).max(initial=0.0)
+        rotations = np.abs(motion[self._rotations].reshape(-1, self._axes).T)
+        rotations = np.hypot.reduce(rotations)
+        largest = float(max(moves / self._simulation.scene.size, rotations.max(initial=0.0)))
         return self._simulation.subdomain.largest(largest)
 
     def _load_error(self, t: float, dt: float) -> float:
@@ -305,6 +316,20 @@ class AdaptiveSteps(Steps):
             self._largest[i] = max(self._largest[i], float(np.abs(values).max()))
             error = max(error, abs(float(weights @ values)) / (self._largest[i] or 1.0))
         return error * dt / (self._t1 - self._t0)
+
+
+def _error_of_vectors(steps: Array, accelerations: Array | None = None) -> Array:
+    """Return errors of rotations by Cayley vectors m, instead of mean angular velocities; (3 n,).
+
+    They are the difference of both vectors and, with angular accelerations a times dt², a × m / 12,
+    because the axis of the rotation changes in the step.
+    """
+    m = steps.reshape(-1, 3)
+    half = np.linalg.norm(m, axis=1, keepdims=True) / 2
+    errors = (np.arctan(half) / np.where(half > 0, half, 1.0) - (half > 0)) * m
+    if accelerations is not None:
+        errors += np.cross(accelerations.reshape(-1, 3), m) / 12
+    return np.asarray(errors.ravel())
 
 
 # -- switches --------------------------------------------------------------------------------------
@@ -327,8 +352,8 @@ class PilotSteps(AdaptiveSteps):
     the step before it is taken again, in shorter steps.
 
     Attributes:
-        taken: Time and configuration at the ends of steps, and whether a later step cannot change
-            them.
+        taken: Time, configuration and, in space, rotations at the ends of steps, and whether a
+            later step cannot change them.
         saved: State before the last step.
     """
 
@@ -336,7 +361,7 @@ class PilotSteps(AdaptiveSteps):
 
     def __init__(self, pilot: Pilot, t1: float, control: Adaptive) -> None:
         super().__init__(pilot, t1, control)
-        self.taken = list[tuple[float, Array, bool]]()
+        self.taken = list[tuple[float, Array, Array | None, bool]]()
         self.saved: State = {}
         # Acceleration before the last step, and the length of its step, 0 if there is none
         self._before: Array = np.zeros(pilot.subdomain.size)
@@ -375,7 +400,9 @@ class PilotSteps(AdaptiveSteps):
         """Take one step, or take the previous step again and this one; see the base class."""
         self._first_dt = self._dt
         super().advance(most, keep=keep)
-        self.taken.append((self._simulation.t, self._simulation.q, self._fresh))
+        simulation = self._simulation
+        turns = simulation.now.turns(0) if self._axes == 3 else None
+        self.taken.append((simulation.t, simulation.q, turns, self._fresh))
 
     def _accept(self, trial: Trial) -> None:
         """Save the state, and accept the step."""
@@ -429,11 +456,15 @@ class JudgedSteps(Steps):
                 if not new:
                     raise
                 break
-        t, q, _ = new[len(new) > 1 and not new[0][2]]
+        t, q, turns, _ = new[len(new) > 1 and not new[0][-1]]
         while simulation.t < t:
             simulation.steps_to(np.array([t]), keep=keep)
         self.steps += 1
-        self.error = max(self.error, REMAINING * ahead.size_of(simulation.q - q))
+        apart = simulation.q - q
+        if turns is not None:
+            dofs = np.vstack([simulation.numbering.dofs, simulation.numbering.dofs_of_bodies])
+            apart[dofs[:, 3:]] = rotations_between(turns, simulation.now.turns(0))
+        self.error = max(self.error, REMAINING * ahead.size_of(apart))
 
     def state(self) -> State:
         """Return steps, error, and the state of the pilot before its last step."""

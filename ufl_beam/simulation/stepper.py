@@ -105,6 +105,10 @@ In motion, schemes without such strains limit the difference from the rotation w
 before the step: Newton's method may find a solution to which no motion leads.
 """
 
+LARGEST_IN_SPACE = 2 * math.tan(math.pi / 3)
+"""Length of the Cayley vector of a rotation by 120°, the largest one of a node in a step in space.
+Newton's method may find steps whose vectors are without bound, close to 180°."""
+
 LARGEST_RIGID_ROTATION = 0.5
 """Largest rotation of a part that a step turns without strain, in statics and if forces work on Δψ.
 
@@ -241,13 +245,14 @@ class Stepper(StateView):
         places = ffi.new("element_block *[]", opens)
         admits = [phase.admits for phase in phases if phase.admits is not None]
         s = np.zeros(subdomain.size) if equation.supports.turned else solver.change
+        largest_turn = LARGEST_IN_SPACE if self.scene.in_space else LARGEST_ROTATION
         self.time_loop = fill(
             ffi.new("time_loop *"),
             equation=equation.c, size=subdomain.size, t=t, q=q.copy(), x=solver.unknowns, s=s,
             prediction=self.prediction.c,
             guess=np.zeros(subdomain.size), proportional=not in_motion,
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
-            largest_turn=LARGEST_ROTATION if scheme.limits_rotation or in_motion else math.inf,
+            largest_turn=largest_turn if scheme.limits_rotation or in_motion else math.inf,
             turns_from_velocities=in_motion and not scheme.limits_rotation,
             rotations=len(rotations), rotation=rotations, axes=3 if self.scene.in_space else 1,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
@@ -458,6 +463,16 @@ class Stepper(StateView):
         if failure == lib.NO_EQUILIBRIUM:
             self.together.synchronize(self.solver.error() or error)
             raise self.solver.failure()
+        if failure == lib.TURNS_TOO_FAR and self.scene.in_space:
+            rotations = self.subdomain.rotations
+            vectors = self._copy(c.s)[rotations].reshape(-1, 3)
+            largest = int(rotations[3 * int(np.argmax(np.hypot.reduce(vectors.T)))])
+            angle, wanted = 2 * math.atan(c.turn / 2), 2 * math.tan(math.pi / 6)
+            raise StepFailed(
+                f"{self.numbering.describe(largest).split(' of ', 1)[1]} turns by "
+                f"{math.degrees(angle):.0f}° in the step, more than the limit of 120°; with dt = "
+                f"{wanted / c.turn * c.step.dt:.1e} s it would turn by about 60°"
+            )
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
                 f"a node turns by {c.turn:.3g} rad in the step"

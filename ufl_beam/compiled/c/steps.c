@@ -551,12 +551,26 @@ static void watch_forces(force_watch *w, const time_loop *m)
   }
 }
 
+/* Subtract whole numbers from unknowns of rotations in space, whose changes alone have a meaning. Otherwise they would
+ * grow with the turns, and their steps would lose digits. At least 1 remains as the size of round-off of frames. */
+static void shorten_rotations(time_loop *m)
+{
+  prediction *p = m->prediction;
+  for (int k = 0; k < m->rotations; ++k) {
+    const int i = m->rotation[k];
+    const double whole = trunc(m->q[i]), away = fabs(whole) < 2 ? 0 : whole - copysign(1, whole);
+    m->q[i] -= away, p->q_before[i] -= away;
+    for (int j = 0; j < p->known; ++j) p->past[(size_t)p->place[j] * m->size + i] -= away;
+  }
+}
+
 /* Accept the end of the step as the state, and show it to watches; see accept_end. */
 int accept_step(time_loop *m)
 {
   const int accepted = accept_end(m);
   m->taken = 0;
   if (m->stages > 1) enter_stage(m->prediction, m->t, m->q);
+  if (m->axes == 3 && m->rates) shorten_rotations(m);
   ++m->substeps;
   if (m->forces && !isinf(m->step.dt)) watch_forces(m->forces, m);
   for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, m->prediction->q_before, m->q);
