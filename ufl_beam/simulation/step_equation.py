@@ -24,6 +24,7 @@ from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space, dead_mo
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.cells_in_space import turns_at
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -34,6 +35,7 @@ from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import Rayleigh
+from ufl_beam.model.supports import Support
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.boundary_conditions import Supports
@@ -219,7 +221,7 @@ class StepEquation:
             has_friction(connector.law)
             for connector in self.subdomain.numbering.scene.all_connectors
         )
-        if self.inertia is None or self.supports.work or friction:
+        if self.inertia is None or self.supports.work or self.supports.hinges or friction:
             self.supports.carry_on(archive, q)
         if self.inertia is not None:
             self.inertia.carry_on(archive, len(self.inertia.more))
@@ -253,12 +255,26 @@ class StepEquation:
                 load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
+        if self.supports.hinges and not same:
+            self._find_angles(t)
         if self.inertia is not None and same:
             known = sum(name in internal for name in self.inertia.scheme.further_rates)
             self.inertia.carry_on(archive, known)
             if BEFORE in internal:
                 self._pass_on_step(archive, q)
         return unknown
+
+    def _find_angles(self, t: float) -> None:
+        numbering = self.subdomain.numbering
+        turns: Array = np.zeros((1, len(numbering.points) + len(numbering.scene.rigid_bodies), 4))
+        for term in self.nodes_in_space:
+            places, nodes = term.turns(numbering)
+            turns[0, nodes] = term.states.ravel()[places]
+
+        def rotation_vector(support: Support) -> Array:
+            return np.asarray(turns_at(numbering, support.place, turns).as_rotvec()[0])
+
+        self.supports.find_angles(rotation_vector, t)
 
     def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""

@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: MIT
+"""Supports and loads in space: equality with the plane, closed forms, balances, restart, errors."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ufl_beam as ub
+
+EXACT = ub.Newton(rtol=1e-13)
+STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
+OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
+TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
+SECTION = ub.Section(**STIFF, **OTHER)
+
+
+def flat(x, y):
+    return (x, y)
+
+
+def skew(x, y):
+    return tuple(TURN.apply([x, y, 0.0]))
+
+
+def normal(at, size=1.0):
+    """A vector across the plane of a scene in space, or the number of the plane."""
+    return size if at is flat else tuple(TURN.apply([0.0, 0.0, size]))
+
+
+def driven(at, more):
+    """A frame whose foot moves and turns as functions of time, on a roller at an angle."""
+    up = {} if at is flat else {"up": normal(at)}
+    turning = {} if at is flat else {"axis": normal(at), "w": 0.0}
+    section = ub.Section(**STIFF) if at is flat else SECTION
+    sides = [{}, {}] if at is flat else [{"up": at(-3, 4)}, {"up": at(0, 1)}]
+    post = ub.Beam(at(0, 0), at(4, 3), section, cells=4, **sides[0])
+    girder = ub.Beam(at(4, 3), at(7, 3), section, cells=3, **sides[1])
+    foot = ub.PrescribedDisplacement(
+        post.start, u=lambda t: 0.3 * np.sin(2 * t), v=lambda t: 0.1 * t, psi=lambda t: 1.5 * t * t,
+        along=at(3, 4), **up, **turning,
+    )  # fmt: skip
+    return ub.Scene(
+        [post, girder], joints=[ub.Rigid(post.end, girder.start)],
+        supports=[foot, ub.Roller(girder.end, along=at(2, 1)), *more(post, girder, at)[0]],
+        loads=[ub.Gravity(at(0.5, -1)), *more(post, girder, at)[1]],
+    )  # fmt: skip
+
+
+def both(make, scheme, places, t=1.0, dt=0.1):
+    """Run a scene in the plane and in a skew plane in space, compare them, and return the runs."""
+    runs = [
+        ub.simulate(make(at), scheme, t=(0, t), dt=dt, newton=EXACT, progress=False)
+        for at in (flat, skew)
+    ]
+    size, back = runs[0].scene.size, TURN.inv()
+    for place in places:
+        plane, space = (run.displacement(place(run.scene)) for run in runs)
+        u, rotation = back.apply(space[:, :3]), back.apply(space[:, 3:])
+        assert np.abs(u[:, :2] - plane[:, :2]).max() < 1e-12 * size
+        assert np.abs(u[:, 2]).max() < 1e-12 * size
+        wrapped = Rotation.from_rotvec(plane[:, 2:] * [[0.0, 0.0, 1.0]]).as_rotvec()
+        assert np.abs(rotation - wrapped).max() < 1e-11
+    for one, other in zip(*(run.scene.supports for run in runs), strict=True):
+        plane, space = runs[0].reaction(one)[1:], runs[1].reaction(other)[1:]
+        largest = np.abs(plane).max()
+        force, moment = back.apply(space[:, :3]), back.apply(space[:, 3:])
+        assert np.abs(force[:, :2] - plane[:, :2]).max() < 1e-11 * largest
+        assert np.abs(moment[:, 2] - plane[:, 2]).max() < 1e-11 * largest
+        assert max(np.abs(force[:, 2]).max(), np.abs(moment[:, :2]).max()) < 1e-11 * largest
+    for name, plane in runs[0].energy.supplied.items():
+        space = runs[1].energy.supplied[name]
+        assert np.abs(space - plane).max() < 1e-11 * max(1.0, np.abs(plane).max())
+    return runs
+
+
+SCHEMES = [
+    ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.Static(),
+    ub.EnergyMomentumStatic(),
+]  # fmt: skip
+ENDS = [lambda scene: scene.beams[0].start, lambda scene: scene.beams[1].end]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_driven_frame_equals_the_plane(scheme):
+    both(lambda at: driven(at, lambda *_: ([], [])), scheme, ENDS)
+
+
+AXIS = np.array([1.0, 2.0, -1.0]) / np.sqrt(6)
+
+
+def turns(t):
+    """Three turns, which begin slowly and end."""
+    return 6 * np.pi * t * t / (t * t + 1)
+
+
+def propeller(psi=turns, arm=True):
+    """A beam whose root turns about a skew axis; with a body at its end."""
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=4)
+    ball = ub.Body((3, 1, 0.5), mass=2.0, inertia=(1, 1, 1.5))
+    more = {"bodies": [ball], "joints": [ub.Rigid(beam.end, ball.middle)]} if arm else {}
+    root = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, psi=psi, axis=tuple(AXIS))
+    return ub.Scene([beam], supports=[root], **more)
+
+
+def test_a_root_turns_three_times_about_a_skew_axis():
+    """The work is the energy, the moment changes the angular momentum, the axis stays."""
+    run = ub.simulate(propeller(), ub.EnergyMomentum(), t=(0, 4), dt=0.02, newton=EXACT,
+                      progress=False)  # fmt: skip
+    (root,), energy = run.scene.supports, run.energy
+    assert np.abs(energy.supplied["supports"] - energy.total).max() < 1e-12 * energy.total.max()
+    assert energy.total[-1] > 100.0
+    rotation = Rotation.from_rotvec(run.displacement(root.place)[:, 3:])
+    assert np.abs(rotation.apply(AXIS) - AXIS).max() < 1e-12
+    exact = Rotation.from_rotvec(turns(run.times)[:, None] * AXIS)
+    assert (rotation * exact.inv()).magnitude().max() < 1e-12
+    momentum, reaction = run.momentum(), run.reaction(root)
+    rates = np.diff(momentum, axis=0) / 0.02
+    assert np.abs(rates - reaction[1:]).max() < 1e-10 * np.abs(rates).max()
+
+
+def test_a_driven_root_equals_a_joint_with_a_motor():
+    """Within half a turn, which motors can measure."""
+    driven = propeller(arm=False)
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=4)
+    ground = ub.ground(0, 0, 0)
+    motor = ub.Turn(ground, beam.start, ub.PrescribedMotion(turns), axis=tuple(AXIS))
+    joint = ub.Revolute(ground, beam.start, axis=tuple(AXIS))
+    jointed = ub.Scene([beam], joints=[joint], connectors=[motor])
+    one, other = (
+        ub.simulate(
+            x,
+            ub.EnergyMomentum(),
+            t=(0, 0.4),
+            dt=0.02,
+            newton=ub.Newton(rtol=1e-12),
+            progress=False,
+        )
+        for x in (driven, jointed)
+    )
+    ends = [run.displacement(run.scene.beams[0].end) for run in (one, other)]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-13
+    supplied = one.energy.supplied["supports"], other.energy.supplied["motors"]
+    assert np.abs(supplied[0] - supplied[1]).max() < 1e-11 * supplied[0].max()
+
+
+@pytest.mark.parametrize("psi", [None, lambda t: 4 * t], ids=["on a spring", "driven"])
+def test_moments_of_a_hinge_in_statics(psi):
+    """The moments balance the force at the tip; a hinge that is free has none about its axis."""
+    scene = propeller(psi, arm=False)
+    (beam,), (root,) = scene.beams, scene.supports
+    pull = ub.PointLoad(beam.end, force=(1, -2, 3), amplitude=lambda t: 1 + t)
+    spring = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(100.0), axis=tuple(AXIS))
+    whole = ub.Scene([beam], supports=[root], loads=[pull], connectors=[spring] * (psi is None))
+    run = ub.simulate(whole, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    force = np.array([1.0, -2.0, 3.0]) * (1 + run.times[1:, None])
+    reaction, tip = run.reaction(root)[1:], run.position(beam.end)[1:]
+    moment = reaction[:, 3:].copy()
+    if psi is None:
+        assert np.abs(moment @ AXIS).max() < 1e-9
+        assert np.linalg.norm(run.displacement(beam.start)[-1, 3:]) > 0.04
+        moment -= run.connector(spring).force[1:, None] * AXIS
+    assert np.abs(reaction[:, :3] + force).max() < 1e-9
+    assert np.abs(moment + np.cross(tip, force)).max() < 1e-8
+
+
+def test_a_point_slides_in_turned_axes():
+    """A heavy beam whose ends slide along skew lines: the lines, the ledger, and reactions."""
+    lines = np.array([[1.0, 2.0, -1.0], [2.0, -1.0, 1.0]])
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=4)
+    rollers = [
+        ub.Roller(place, along=tuple(line))
+        for place, line in zip((beam.start, beam.end), lines, strict=True)
+    ]
+    twist = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(50.0), axis=(3, 1, 0.5))
+    scene = ub.Scene(
+        [beam], supports=rollers, connectors=[twist], loads=[ub.Gravity((0.0, -1.0, -9.81))]
+    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=0.02, progress=False)
+    assert run.energy.worst < 1e-10
+    for roller, line in zip(rollers, lines, strict=True):
+        moved, force = run.displacement(roller.place)[:, :3], run.reaction(roller)[1:, :3]
+        assert np.abs(moved).max() > 0.1
+        assert np.abs(np.cross(moved, line)).max() < 1e-13
+        assert np.abs(force @ line).max() < 1e-12 * np.abs(force).max()
+
+
+def test_a_base_that_shakes_equals_an_acceleration_of_all_masses():
+    """In the frame of the base; the base is shaken along skew axes, in directions of its own."""
+    shake, accelerations = (lambda t: 0.05 * t**2), 0.1
+    along, up = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
+    beam = ub.Beam((0, 0, 0), (0, 0.5, 3), SECTION, cells=4, up=(1, 0, 0))
+    base = ub.PrescribedDisplacement(
+        beam.start, u=shake, v=0.0, w=lambda t: -2 * shake(t), along=tuple(along), up=tuple(up),
+        axis=(0, 0, 1), psi=0.0,
+    )  # fmt: skip
+    drift = ub.Velocity([beam], linear=(0, 0, 0))
+    moving = ub.Scene([beam], supports=[base], initial=[drift])
+    still = ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start)],
+        loads=[ub.Gravity(tuple(-accelerations * (along - 2 * up)))],
+    )  # fmt: skip
+    runs = [
+        ub.simulate(x, ub.EnergyMomentum(), t=(0, 1), dt=0.05, newton=EXACT, progress=False)
+        for x in (moving, still)
+    ]
+    one, other = (run.displacement(beam.end) for run in runs)
+    carried = shake(runs[0].times)[:, None] * (along - 2 * up)
+    assert np.abs(one[:, :3] - carried - other[:, :3]).max() < 1e-12
+    assert np.abs(one[:, 3:] - other[:, 3:]).max() < 1e-12
+    assert np.abs(other[:, :3]).max() > 1e-3
+    assert runs[0].energy.worst < 1e-12
+
+
+@pytest.mark.parametrize("psi", [None, turns], ids=["free", "driven"])
+def test_start_and_checkpoint_of_a_hinge(psi, shared_path):
+    """A restart changes no bit; another scene, which finds the angle of the place, only digits."""
+    scene = propeller(psi, arm=False)
+    (beam,), (root,) = scene.beams, scene.supports
+    push = ub.PointLoad(beam.end, force=(1, 4, 2), amplitude=lambda t: t < 0.3)
+    pushed = ub.Scene([beam], supports=[root], loads=[push])
+
+    def run(end, scene=pushed, begin=0.0, **more):  # times are binary numbers
+        return ub.simulate(
+            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 16, progress=False, **more
+        )
+
+    checkpoint = ub.Checkpoint(shared_path / "run.checkpoint", every=8)
+    whole, first = run(4), run(2, checkpoint=checkpoint)
+    restarted = run(4, checkpoint=checkpoint)
+    for result in (lambda x: x.displacement(beam.end), lambda x: x.reaction(root)[1:]):
+        assert (result(whole) == result(restarted)).all()
+    assert np.linalg.norm(whole.displacement(beam.start)[32, 3:]) > 0.1
+    other = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, psi=psi, axis=tuple(AXIS))
+    for parts in ({"supports": [root], "loads": [push]}, {"supports": [other]}):
+        second = run(4, ub.Scene([beam], **parts), begin=2.0, start=first)
+        apart = whole.displacement(beam.end)[32:] - second.displacement(beam.end)
+        assert np.abs(apart).max() < 1e-9
+    tilted = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=(0, 0, 1))
+    with pytest.raises(ub.ModelError, match="turned about another axis"):
+        run(4, ub.Scene([beam], supports=[tilted]), begin=2.0, start=first)
