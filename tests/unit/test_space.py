@@ -453,10 +453,10 @@ WRONG = {
         lambda: ub.Scene([PLANAR], loads=[ub.PointLoad(PLANAR.end, moment=(0, 0, 1))]),
         "must have 1 components",
     ),
-    "load at an arm": (
+    "follower at an arm": (
         lambda: ub.Scene(
-            bodies=[BALL], loads=[ub.PointLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
-        ), "act at their centres",
+            bodies=[BALL], loads=[ub.FollowerLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
+        ), "not the centre of the body",
     ),
     "friction": (
         lambda: ub.Scene([BEAM], connectors=[

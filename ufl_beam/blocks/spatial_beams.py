@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Statements of beams in space: elastic cells with the rotation of their mass, dead moments."""
+"""Statements of beams and bodies in space: elastic cells, and the rotation of masses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import alike
-from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import Block, BlockSetting, Elements
 from ufl_beam.blocks.nodes_in_space import (
     change,
     new_state,
@@ -47,7 +47,6 @@ from ufl_beam.mechanics.spatial_kinematics import (
     transposed_times,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
-from ufl_beam.model.loads import PointLoad
 from ufl_beam.terms.term import Callbacks, Phases
 
 
@@ -110,7 +109,7 @@ class ElasticCellInSpace(StatementInSpace):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
-        h, axes, at_end = at["h"], _matrix(at, "R"), acts_at_end(self.scheme)
+        h, axes, at_end = at["h"], matrix_of(at, "R"), acts_at_end(self.scheme)
         q0 = [quaternion(at, k) for k in (0, 1)]
         turns = [Turn(at.stage, change(at, "abc", k), q0[k]) for k in (0, 1)]
         u = [[vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
@@ -169,7 +168,7 @@ class ElasticCellInSpace(StatementInSpace):
 
     def _turning(self, at: Inputs, own: Sequence[Vector]) -> list[Vector]:
         """Return the moments by which the momenta of the nodes turn."""
-        J, momenta = _matrix(at, "J"), list[Vector]()
+        J, momenta = matrix_of(at, "J"), list[Vector]()
         for k, m in enumerate(own):
             before = vector(at, "rate1", "abc", k)
             ω = add(scale(at["rates 0 0"], m), scale(at["rates 0 1"], before))
@@ -190,7 +189,7 @@ FIRST = 1.0, 0.0, 0.0
 """Axis 1 of a cell, in its axes."""
 
 
-def _matrix(at: Inputs, name: str) -> tuple[Vector, ...]:
+def matrix_of(at: Inputs, name: str) -> tuple[Vector, ...]:
     """Return a matrix among the numbers; the rows of R are the axes of the cell."""
     return tuple(tuple(at[f"{name}{i}{j}"] for j in range(3)) for i in range(3))
 
@@ -244,24 +243,6 @@ class CellsInSpace(Block):
     def phases(self, callbacks: Callbacks) -> Phases:
         """See the base class."""
         return super().phases(callbacks)._replace(change=loop("change_of_cells", self._c))
-
-
-@dataclass(frozen=True)
-class DeadMoment(StatementInSpace):
-    """Moment at a node with a constant direction; it is not conservative."""
-
-    nodes = 1
-    numbers = "m0", "m1", "m2"
-    of_step = ("factor",)
-
-    def equations(self, at: Inputs) -> Equations:
-        """See the base class."""
-        turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
-        M = scale(at["factor"], tuple(at[f"m{i}"] for i in range(3)))
-        forces = [ufl.as_ufl(0.0)] * 3 + [
-            -x for x in turn.on_node(M, at_end=acts_at_end(self.scheme))
-        ]
-        return Equations(forces, new_state([turn]))
 
 
 def turned_momentum(m: Vector, P: Vector, dt: Expr) -> Vector:
@@ -325,22 +306,3 @@ def bodies_in_space(setting: BlockSetting) -> list[BodiesInSpace]:
     elements = Elements("bodies in space", np.arange(len(bodies)), nodes, [*numbers])
     statement = TurningBody(setting.scheme)
     return [BodiesInSpace(statement, elements, setting, kind="inertia")]
-
-
-class DeadMoments(Block):
-    """Moments at nodes, whose rotations are states."""
-
-    remembers = True
-
-
-def dead_moments(setting: BlockSetting) -> list[Block]:
-    """Return the block of moments at places, if there are any."""
-    subdomain = setting.subdomain
-    loads = [x for x in setting.scene.loads if isinstance(x, PointLoad) and np.any(x.moment)]
-    if not loads:
-        return []
-    nodes = np.array([subdomain.local(subdomain.numbering.node(load.place)) for load in loads])
-    moments, mine = np.array([load.moment for load in loads], float), np.arange(len(loads))
-    in_time = [InTime(load.amplitude, load) for load in loads]
-    elements = Elements("dead moments", mine, nodes, [*moments.T], in_time, {"factor": mine})
-    return [DeadMoments(DeadMoment(setting.scheme), elements, setting, supplies="loads")]

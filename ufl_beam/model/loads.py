@@ -33,7 +33,7 @@ from ufl_beam.model.bodies import (
     moves_with_node,
 )
 from ufl_beam.model.connector_laws import PrescribedForce
-from ufl_beam.model.connectors import Component, Connector
+from ufl_beam.model.connectors import Component, Connector, axes_of
 from ufl_beam.model.functions import Table, Timed, TimeFunction, steady, value_at
 from ufl_beam.model.records import (
     Instance,
@@ -103,10 +103,10 @@ class PointLoad(LoadAtPlace):
         """Connectors that apply a load away from the centre of a body; otherwise empty."""
         if moves_with_node(self.place):
             return ()
-        (x, y), fixed = self.force, ground(*self.place.point)
-        components = [("parting", x, (1.0, 0.0)), ("parting", y, (0.0, 1.0))]
-        components += [("turning", self.moment, (1.0, 0.0))] * bool(self.moment)
-        connectors = []
+        fixed, axes, connectors = ground(*self.place.point), axes_of(self.place.point), []
+        components: list[Any] = [("parting", *x) for x in zip(self.force, axes, strict=False)]
+        if len(axes) == 2 and self.moment:  # in space, moments of bodies do not depend on the place
+            components.append(("turning", self.moment, axes[0]))
         for motion, size, axis in components:
 
             def push(t: float, size: float = size) -> float:
@@ -254,6 +254,13 @@ class LineLoad(LoadAlongBeam):
     amplitude: Timed = steady
 
 
+def require_normal(normal: object, what: str) -> float | tuple[float, float]:
+    """Return a pressure as a number, or as two numbers in space, or raise."""
+    if np.ndim(normal) == 0:  # type: ignore[arg-type]
+        return checks.require_number(normal, what)
+    return checks.require_vector(normal, what)
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class Pressure(LoadAlongBeam):
@@ -264,7 +271,9 @@ class Pressure(LoadAlongBeam):
 
     Args:
         beam: Loaded beam.
-        normal: Force along the normal, which points to the left of the direction of the beam; N/m.
+        normal: Force along the normal, which points to the left of the direction of the beam; in
+            space two forces, normal to the deformed axis in the directions of the axes 2 and 3 of
+            the section; N/m.
         tangential: Force along the axis, in the direction of the beam; N/m.
         amplitude: Factor on both forces, a function of time t (s).
         span: As in :class:`LineLoad`.
@@ -282,7 +291,7 @@ class Pressure(LoadAlongBeam):
         0.14 N, 2000 N
     """
 
-    normal: Number = 0.0
+    normal: Annotated[Any, require_normal] = 0.0
     tangential: Number = 0.0
     amplitude: Timed = steady
 

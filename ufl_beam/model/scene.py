@@ -27,7 +27,6 @@ from ufl_beam.model.bodies import (
     Representatives,
     Velocity,
     merged,
-    moves_with_node,
     node,
 )
 from ufl_beam.model.checks import require_all
@@ -55,12 +54,14 @@ from ufl_beam.model.joints import (
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
+    FollowerLoad,
     Gravity,
     LineLoad,
     Load,
     LoadAtPlace,
     MovingLoad,
     PointLoad,
+    Pressure,
     RotatingFrame,
 )
 from ufl_beam.model.records import Record
@@ -194,12 +195,12 @@ class Scene(Record, Rich):
                 f"{beam.name}: its ends have two coordinates, but other beams are in space; give "
                 "all points three coordinates"
             )
-        names = "force", "acceleration", "linear", "about", "moment", "angular"
+        sizes = dict.fromkeys(("force", "acceleration", "linear", "about"), d)
+        sizes |= dict.fromkeys(("moment", "angular"), 1 if d == 2 else 3) | {"normal": d - 1}
         records: list[Record] = [*self.loads, *self.initial]
         for record in records:
-            for name in names:
+            for name, wanted in sizes.items():
                 vector = getattr(record, name, None)
-                wanted = 1 if d == 2 and name in ("moment", "angular") else d
                 if vector is not None and np.any(vector) and np.size(vector) != wanted:
                     raise ModelError(
                         f"{record._label()}: {name} = {vector} must have {wanted} components, "
@@ -402,7 +403,8 @@ class Scene(Record, Rich):
 
 IN_SPACE = (
     Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
-    Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, LineLoad, Gravity, Velocity,
+    Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, FollowerLoad, LineLoad, Pressure,
+    Gravity, Velocity,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
 
@@ -421,11 +423,6 @@ def require_space(scene: Scene) -> None:
         if has_friction(law) or isinstance(law, RigidPlastic):
             raise ModelError(
                 f"{record._label()}: {type(law).__name__} is a law for scenes in the plane"
-            )
-        if isinstance(record, PointLoad) and not moves_with_node(record.place):
-            raise ModelError(
-                f"{record._label()}: in space loads of bodies act at their centres; for a load at "
-                "an arm, join a short stiff beam to the body and load its end"
             )
     for beam in scene.beams:
         section = beam.section

@@ -20,7 +20,8 @@ from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
-from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space, dead_moments
+from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space
+from ufl_beam.blocks.spatial_loads import loads_in_space
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -126,14 +127,15 @@ class StepEquation:
         self.in_space, self.nodes_in_space = list[CellsInSpace](), list[Any]()
         if scene.in_space:
             self.in_space = [CellsInSpace(fields, in_blocks)] if len(fields.order) else []
-            self.loads += dead_moments(in_blocks)
+            self.loads += loads_in_space(in_blocks)
             self.nodes_in_space += [*self.in_space, *bodies_in_space(in_blocks)]
             others += self.nodes_in_space[len(self.in_space) :]
         elif elastic.any():
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
-        self.loads += load_blocks(in_blocks)
+        if not scene.in_space:
+            self.loads += load_blocks(in_blocks)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""Statements of loads in space that depend on rotations: moments, follower loads, pressures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.nodes_in_space import change, new_state, quaternion, vector
+from ufl_beam.blocks.spatial_beams import FIRST, StatementInSpace, matrix_of
+from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.discretization.cells_in_space import cell_axes
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.mechanics.spatial_kinematics import (
+    Turn,
+    add,
+    between,
+    cross,
+    matrix,
+    scale,
+    subtract,
+    times,
+    transposed_times,
+)
+from ufl_beam.mechanics.time_scheme import acts_at_end
+from ufl_beam.model.loads import FollowerLoad, LoadAtPlace, PointLoad, Pressure
+from ufl_beam.quadrature import gauss_rule
+from ufl_beam.terms.dead_loads import loaded_cells
+
+NO_FORCE = [ufl.as_ufl(0.0)] * 3
+
+
+@dataclass(frozen=True)
+class LoadOnNode(StatementInSpace):
+    """Force and moment at a node.
+
+    They turn with the node, or the moment has a constant direction and is not conservative; dead
+    forces are no statement.
+
+    Attributes:
+        follows: Whether they turn with the node.
+    """
+
+    follows: bool
+    nodes = 1
+    of_step = ("factor",)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Moment, and force of a load that follows, in the undeformed scene."""
+        return [f"{x}{i}" for x in "MF"[: 1 + self.follows] for i in range(3)]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class."""
+        turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
+        M, *F = (
+            scale(at["factor"], tuple(at[f"{x}{i}"] for i in range(3)))
+            for x in "MF"[: 1 + self.follows]
+        )
+        forces: Sequence[Any] = NO_FORCE
+        if self.follows:
+            frame = matrix(between(at.stage, turn.q0, turn.q1, self.scheme.load_weight))
+            M, forces = times(frame, M), scale(-1.0, times(frame, F[0]))
+        on_node = turn.on_node(M, at_end=acts_at_end(self.scheme))
+        return Equations([*forces, *scale(-1.0, on_node)], new_state([turn]))
+
+
+@dataclass(frozen=True)
+class PressureInSpace(StatementInSpace):
+    """Forces along a cell, normal and tangential to the deformed axis, per deformed length."""
+
+    nodes = 2
+    of_step = ("factor",)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Forces along the axes of the section for a factor of 1, length, axes, and shares."""
+        axes = [f"R{i}{j}" for i in range(3) for j in range(3)]
+        return ["p1", "p2", "p3", "h", *axes, *(f"share{g}" for g in range(4))]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; the derivative of the axis has the length of its part of the cell."""
+        w, axes = self.scheme.load_weight, matrix_of(at, "R")
+        turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
+        u = [add(vector(at, "q0", "xyz", k), scale(w, change(at, "xyz", k))) for k in (0, 1)]
+        first, last = (between(at.stage, turn.q0, turn.q1, w) for turn in turns)
+        frame = matrix(between(at.stage, first, last))
+        second, third = (times(frame, axes[i]) for i in (1, 2))
+        along = add(scale(at["h"], transposed_times(axes, FIRST)), subtract(u[1], u[0]))
+        directions = along, cross(third, along), cross(along, second)
+        p1, p2, p3 = (scale(at[f"p{i + 1}"], x) for i, x in enumerate(directions))
+        force = tuple(map(at.stage, scale(at["factor"], add(add(p1, p2), p3))))
+        points = [*zip(*gauss_rule(4), strict=True)]
+        of_node = [
+            sum(float(x * (1 - s, s)[k]) * at[f"share{g}"] for g, (s, x) in enumerate(points))
+            for k in (0, 1)
+        ]
+        forces = [-of_node[k] * x for x in force for k in (0, 1)]
+        return Equations([*forces, *NO_FORCE, *NO_FORCE], new_state(turns))
+
+
+class LoadsInSpace(Block):
+    """Loads at nodes, whose rotations are states."""
+
+    remembers = True
+
+
+def loads_in_space(setting: BlockSetting) -> list[Block]:
+    """Return the blocks of the loads of a scene in space, besides dead forces."""
+    loads = setting.scene.loads
+    moments = [x for x in loads if isinstance(x, PointLoad) and np.any(x.moment)]
+    followers = [x for x in loads if isinstance(x, FollowerLoad)]
+    made = [
+        *_at_nodes("dead moments", moments, setting),
+        *_at_nodes("follower loads", followers, setting),
+        *_pressures([x for x in loads if isinstance(x, Pressure)], setting),
+    ]  # fmt: skip
+    return [LoadsInSpace(*some, setting, supplies="loads") for some in made]
+
+
+def _at_nodes(
+    name: str, loads: Sequence[LoadAtPlace], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    if loads:
+        subdomain, mine, follows = setting.subdomain, np.arange(len(loads)), name != "dead moments"
+        nodes = np.array([subdomain.local(subdomain.numbering.node(x.place)) for x in loads])
+        numbers = [
+            [*np.broadcast_to(x.moment, 3), *((*x.force, 0.0)[:3] if follows else ())]
+            for x in loads
+        ]
+        in_time = [InTime(load.amplitude, load) for load in loads]
+        yield LoadOnNode(setting.scheme, follows), Elements(
+            name, mine, nodes, np.array(numbers, float).T, in_time, {"factor": mine}
+        )  # fmt: skip
+
+
+def _pressures(
+    loads: Sequence[Pressure], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    if loads:
+        subdomain = setting.subdomain
+        pairs = [loaded_cells(load, subdomain) for load in loads]
+        cells = np.concatenate([cells for cells, _ in pairs])
+        of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
+        forces = np.array([[x.tangential, *np.broadcast_to(x.normal, 2)] for x in loads])[of_load]
+        lengths, axes = cell_axes(Fields(subdomain, cells))
+        shares = np.concatenate([shares for _, shares in pairs])
+        indices = subdomain.cells[cells] + len(subdomain.numbering.cells) * of_load
+        in_time = [InTime(load.amplitude, load) for load in loads]
+        yield PressureInSpace(setting.scheme), Elements(
+            "pressures", indices, subdomain.cell_dofs[cells],
+            [*forces.T, lengths, *axes.transpose(2, 1, 0).reshape(9, -1), *shares.T], in_time,
+            {"factor": of_load},
+        )  # fmt: skip
