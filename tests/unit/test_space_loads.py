@@ -341,6 +341,57 @@ def test_a_machine_balances_and_restarts(shared_path):
     assert np.abs(second.displacement(wheel) - whole.displacement(wheel)[32:]).max() < 1e-10
 
 
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_a_rotating_frame_equals_the_plane(scheme):
+    def make(at):
+        part = with_load_at_arm(at)
+        frame = ub.RotatingFrame(normal(at, 2.5), about=at(-1, 0.5))
+        return ub.Scene(
+            part.beams, bodies=part.bodies, joints=part.joints, supports=part.supports,
+            loads=[*part.loads[:1], frame],
+        )  # fmt: skip
+
+    both(make, scheme, [lambda scene: scene.bodies[0].middle])
+
+
+def test_a_flight_seen_from_a_rotating_frame():
+    """A bent beam with a spinning wheel, in a frame that turns: the errors are of second order.
+
+    The flight in the frame at rest is turned back; its steps are short.
+    """
+    rate, about = np.array([0.4, -0.8, 0.6]), np.array([0.5, 1.0, -0.3])
+
+    def flight(turning):
+        beam = ub.Beam((0, 0, 0), (2, 1, 0.5), SECTION, cells=2)
+        wheel = ub.Body((2, 1, 0.5), mass=3.0, inertia=(2.0, 3.0, 1.5))
+        joint = ub.Rigid(beam.end, wheel.middle)
+        spin, linear = np.array([0.5, 0.2, -1.0]), np.array([0.3, 0.0, 0.1])
+        if turning:  # velocities of the same motion in the frame
+            spin, linear = spin - rate, linear + np.cross(rate, about)
+        start = ub.Velocity(
+            [beam, wheel], linear=tuple(linear), angular=tuple(spin), about=(0, 0, 0)
+        )
+        frames = [ub.RotatingFrame(tuple(rate), about=tuple(about))] * turning
+        return ub.Scene([beam], bodies=[wheel], joints=[joint], initial=[start], loads=frames)
+
+    def states(turning, dt):
+        run = ub.simulate(
+            flight(turning), ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT, progress=False
+        )
+        assert run.energy.worst < 1e-12
+        wheel = run.scene.bodies[0].middle
+        return run.position(wheel)[-1], Rotation.from_rotvec(run.displacement(wheel)[-1, 3:])
+
+    place, rotation = states(False, 1 / 320)
+    back, errors = Rotation.from_rotvec(-rate), []
+    for dt in (0.1, 0.05):
+        at, turned = states(True, dt)
+        apart = (turned * (back * rotation).inv()).magnitude()
+        errors.append((np.linalg.norm(at - about - back.apply(place - about)), apart))
+    assert (np.abs(np.log2(np.divide(*errors)) - 2) < 0.2).all()
+    assert np.max(errors[1]) < 1e-2
+
+
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), SECTION, name="arm")
 PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
 MOVED = ub.PrescribedDisplacement

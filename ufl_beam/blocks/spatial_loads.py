@@ -11,10 +11,11 @@ import numpy as np
 import ufl
 
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
-from ufl_beam.blocks.nodes_in_space import change, new_state, quaternion, vector
+from ufl_beam.blocks.cells import StatementOnCell
+from ufl_beam.blocks.nodes_in_space import change, new_state, quaternion, unknowns, vector
 from ufl_beam.blocks.spatial_beams import FIRST, StatementInSpace, matrix_of
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
-from ufl_beam.discretization.cells_in_space import cell_axes
+from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.spatial_kinematics import (
     Turn,
@@ -27,12 +28,14 @@ from ufl_beam.mechanics.spatial_kinematics import (
     times,
     transposed_times,
 )
-from ufl_beam.mechanics.time_scheme import acts_at_end
-from ufl_beam.model.loads import FollowerLoad, LoadAtPlace, PointLoad, Pressure
+from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
+from ufl_beam.model.functions import steady
+from ufl_beam.model.loads import FollowerLoad, LoadAtPlace, PointLoad, Pressure, RotatingFrame
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.terms.dead_loads import loaded_cells
 
 NO_FORCE = [ufl.as_ufl(0.0)] * 3
+RATE = "rate x", "rate y", "rate z"
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,79 @@ class PressureInSpace(StatementInSpace):
         return Equations([*forces, *NO_FORCE, *NO_FORCE], new_state(turns))
 
 
+@dataclass(frozen=True)
+class ForceOfRotatingFrame(StatementOnCell):
+    """Centrifugal and Coriolis force on the mass of a cell, or of a node (degree 0).
+
+    Attributes:
+        scheme: Time scheme.
+    """
+
+    scheme: Scheme
+    of_step = "growth", "dt"  # growth: part of the centrifugal force, from 0 to 1 in substeps
+
+    @property
+    def unknowns(self) -> list[str]:
+        """Displacements of all nodes, component by component."""
+        return unknowns(self.nodes)[: 3 * self.nodes]
+
+    @property
+    def numbers(self) -> list[str]:
+        """Mass (kg), angular velocity of the frame (rad/s), positions from its centre (m)."""
+        return ["mass", *RATE, *(f"{c}{k}" for k in range(self.nodes) for c in "XYZ")]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; velocities are means over the step."""
+        rate, on_nodes = tuple(at[x] for x in RATE), list[Any]()
+        for k in range(self.nodes):
+            moved = change(at, "xyz", k)
+            place = add(vector(at, "q0", "xyz", k), scale(self.scheme.load_weight, moved))
+            place = add(tuple(at[f"{c}{k}"] for c in "XYZ"), place)
+            force = scale(at["growth"], cross(rate, cross(rate, place)))
+            if has_inertia(self.scheme):
+                force = add(force, scale(2 / at["dt"], cross(rate, moved)))
+            on_nodes.append(tuple(map(at.stage, scale(at["mass"], force))))
+        if self.nodes == 2:  # as the consistent matrix of inertia
+            a, b = on_nodes
+            on_nodes = [scale(1 / 6, add(scale(2.0, x), y)) for x, y in ((a, b), (b, a))]
+        return Equations([x for some in zip(*on_nodes, strict=True) for x in some])
+
+
+@dataclass(frozen=True)
+class MomentOfRotatingFrame(StatementInSpace):
+    """Centrifugal and gyroscopic moment on the rotary inertia of a node in a rotating frame.
+
+    With the inertia J and the angular velocities ω of the node and b of the frame, in axes of the
+    node, the energy -b·J b is stored, and the moment ω × (2 J - tr J) b has no power.
+    """
+
+    nodes = 1
+    of_step = "growth", "dt"
+
+    @property
+    def numbers(self) -> list[str]:
+        """Inertia (kg m²), and angular velocity of the frame (rad/s)."""
+        return [*(f"J{i}{j}" for i in range(3) for j in range(3)), *RATE]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; the mean of the frames in the step makes the increment exact."""
+        turn, w = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0)), self.scheme.load_weight
+        frames = matrix(turn.q0), matrix(turn.q1)
+        frame = [
+            tuple(map(at.stage, add(scale(1.0 - w, x), scale(w, y))))
+            for x, y in zip(*frames, strict=True)
+        ]
+        J, rate = matrix_of(at, "J"), tuple(at[x] for x in RATE)
+        b = tuple(map(at.stage, transposed_times(frame, rate)))
+        Jb = tuple(map(at.stage, times(J, b)))
+        moment = scale(at["growth"], cross(rate, times(frame, Jb)))
+        if has_inertia(self.scheme):
+            H = subtract(scale(2.0, Jb), scale(J[0][0] + J[1][1] + J[2][2], b))
+            moment = add(moment, times(frame, scale(1 / at["dt"], cross(turn.m, H))))
+        on_node = turn.on_node(moment, at_end=acts_at_end(self.scheme))
+        return Equations([*NO_FORCE, *on_node], new_state([turn]))
+
+
 class LoadsInSpace(Block):
     """Loads at nodes, whose rotations are states."""
 
@@ -119,6 +195,7 @@ def loads_in_space(setting: BlockSetting) -> list[Block]:
         *_at_nodes("dead moments", moments, setting),
         *_at_nodes("follower loads", followers, setting),
         *_pressures([x for x in loads if isinstance(x, Pressure)], setting),
+        *_rotations([x for x in loads if isinstance(x, RotatingFrame)], setting),
     ]  # fmt: skip
     return [LoadsInSpace(*some, setting, supplies="loads") for some in made]
 
@@ -157,3 +234,44 @@ def _pressures(
             [*forces.T, lengths, *axes.transpose(2, 1, 0).reshape(9, -1), *shares.T], in_time,
             {"factor": of_load},
         )  # fmt: skip
+
+
+def _rotations(
+    frames: Sequence[RotatingFrame], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    for frame in frames:  # one at most
+        subdomain, in_time = setting.subdomain, [InTime(steady, frame)]
+        numbering, scheme, bodies = subdomain.numbering, setting.scheme, setting.scene.bodies
+        fields, centre = Fields(subdomain), np.array((*frame.about, 0.0)[:3])
+        nodes = np.array([subdomain.local(numbering.node(x.middle)) for x in bodies], int)
+        lengths, axes = cell_axes(fields)
+        places = fields.coordinates().reshape(-1, 6) - np.tile(centre, 2)
+        masses = lengths * fields.section_values("rhoA").ravel()
+        body_places = np.reshape([x.center for x in bodies], (-1, 3)) - centre
+        for name, dofs, mass, at in (
+            ("rotation of cells", fields.cell_dofs[:, :6], masses, places),
+            (
+                "rotation of masses",
+                nodes.reshape(-1, 6)[:, :3],
+                [x.mass for x in bodies],
+                body_places,
+            ),
+        ):
+            if n := len(mass):
+                rates = np.tile(frame.rate, (n, 1)).T
+                yield ForceOfRotatingFrame(at.shape[1] // 3 - 1, scheme), Elements(
+                    name, np.arange(n), dofs, [np.array(mass), *rates, *at.T], in_time,
+                    {"growth": 0},
+                )  # fmt: skip
+        # Rotary inertia at the nodes of cells, half of each cell, and of bodies
+        J = np.repeat(rotary_inertia(fields, axes) * lengths[:, None, None] / 2, 2, axis=0)
+        J = np.concatenate([J, np.reshape([x.tensor for x in bodies], (-1, 3, 3))])
+        at_nodes = fields.cell_dofs.reshape(-1, 6, 2).transpose(0, 2, 1).reshape(-1, 6)
+        at_nodes = np.concatenate([at_nodes, nodes.reshape(-1, 6)])
+        some = np.flatnonzero(J.any(axis=(1, 2)))
+        rates = np.tile(frame.rate, (len(some), 1)).T
+        if len(some):
+            yield MomentOfRotatingFrame(scheme), Elements(
+                "rotation of inertia", some, at_nodes[some], [*J[some].reshape(-1, 9).T, *rates],
+                in_time, {"growth": 0},
+            )  # fmt: skip

@@ -426,8 +426,8 @@ class RotatingFrame(Load):
     :class:`MovingLoad` with a mass, on which these forces would not act.
 
     Args:
-        rate: Angular velocity of the frame, counter-clockwise; rad/s.
-        about: Centre of rotation; m.
+        rate: Angular velocity of the frame, counter-clockwise; in space a vector; rad/s.
+        about: Centre of rotation, or a point of its axis; m.
 
     Example:
         >>> blade = ub.Scene([beam], supports=scene.supports, loads=[ub.RotatingFrame(rate=50.0)])
@@ -436,8 +436,8 @@ class RotatingFrame(Load):
         True
     """
 
-    rate: Number
-    about: Vector = (0.0, 0.0)
+    rate: Annotated[Any, require_moment]
+    about: VectorOfScene = (0.0, 0.0)
 
     # A rate that varies in time would cause a further force, the Euler force.
     amplitude: ClassVar[TimeFunction] = steady  # type: ignore[misc]

@@ -196,7 +196,9 @@ class Scene(Record, Rich):
                 "all points three coordinates"
             )
         sizes = dict.fromkeys(("force", "acceleration", "linear", "about"), d)
-        sizes |= dict.fromkeys(("moment", "angular"), 1 if d == 2 else 3) | {"normal": d - 1}
+        sizes |= dict.fromkeys(("moment", "angular", "rate"), 1 if d == 2 else 3) | {
+            "normal": d - 1
+        }
         records: list[Record] = [*self.loads, *self.initial]
         for record in records:
             for name, wanted in sizes.items():
@@ -404,7 +406,7 @@ class Scene(Record, Rich):
 IN_SPACE = (
     Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
     Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, FollowerLoad, LineLoad, Pressure,
-    Gravity, Velocity,
+    Gravity, RotatingFrame, Velocity,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
 
