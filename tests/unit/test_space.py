@@ -463,8 +463,8 @@ WRONG = {
             ub.Slide(ub.ground(1, 0, 0), BEAM.end, ub.Coulomb(1.0), axis=(0, 1, 0))
         ]), "Coulomb is a law for scenes in the plane",
     ),
-    "planar load": (
-        lambda: ub.Scene([BEAM], loads=[ub.MovingLoad(BEAM, abs)]), "MovingLoad is for scenes",
+    "moving mass": (
+        lambda: ub.Scene([BEAM], loads=[ub.MovingLoad(BEAM, abs, mass=1.0)]), "masses that move",
     ),
     "revolute without axis": (
         lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start), "give axis=(x, y, z)",

@@ -282,6 +282,16 @@ def test_a_load_at_an_arm_equals_the_plane(scheme):
     both(with_load_at_arm, scheme, [lambda scene: scene.bodies[0].middle])
 
 
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_a_moving_force_equals_the_plane(scheme):
+    """It crosses the joint of two beams, and leaves the second one."""
+
+    def moves(post, girder, at):
+        return [], [ub.MovingLoad([post, girder], lambda t: 9 * t, force=at(5, -20))]
+
+    both(lambda at: driven(at, moves), scheme, ENDS)
+
+
 def test_a_spinning_body_with_a_follower_force():
     """The force turns with the body, by the same angle in each step: sums of its directions."""
     force, spin, dt = np.array([3.0, -1.0, 2.0]), np.array([1.0, -2.0, 2.0]), 0.05
@@ -390,6 +400,38 @@ def test_a_flight_seen_from_a_rotating_frame():
         errors.append((np.linalg.norm(at - about - back.apply(place - about)), apart))
     assert (np.abs(np.log2(np.divide(*errors)) - 2) < 0.2).all()
     assert np.max(errors[1]) < 1e-2
+
+
+def test_whirling_of_a_shaft():
+    """Both frequencies of a Rayleigh shaft on bearings, in the frame that turns with it.
+
+    (ρA + I k²) ω² - J Ω k² ω - E I k⁴ = 0 with k = π/L, about the frame at rest.  The scheme maps
+    a frequency ω to 2/dt arctan(ω dt/2).  Errors are of second order in the length of the cells.
+    """
+    L, E, Ω, k, dt = 10.0, 400.0, 12.0, np.pi / 10.0, 0.02
+    exact = np.roots([1 + 0.3 * k**2, -0.6 * Ω * k**2, -E * k**4])
+    assert np.abs(np.sort(exact) - [-1.630614, 2.320791]).max() < 1e-6
+    section = ub.Section(
+        EA=1e7, GA=1e7, GA3=1e7, EI=E, EI2=E, GJ=300.0, rhoA=1.0, rhoI=0.3, rhoI2=0.3
+    )
+
+    def frequencies(cells):
+        shaft = ub.Beam((0, 0, 0), (L, 0, 0), section, cells=cells)
+        bearings = [ub.Pinned(shaft.start), ub.Roller(shaft.end, along=(1, 0, 0))]
+        push = ub.LineLoad(shaft, force=(0, 1e-6, 0), amplitude=lambda t: t < 0.5,
+                           profile=lambda s: np.sin(np.pi * s))  # fmt: skip
+        frame = ub.RotatingFrame((Ω, 0, 0))
+        scene = ub.Scene([shaft], supports=bearings, loads=[push, frame])
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 30), dt=dt, progress=False)
+        y = run.displacement(shaft.at(0.5))[int(1 / dt) :, 1:3] @ [1.0, 1.0j]
+        # The sum of two exponentials: y[n + 1] is a combination of y[n] and y[n - 1]
+        (a, b), *_ = np.linalg.lstsq(np.column_stack([y[1:-1], y[:-2]]), y[2:], rcond=None)
+        steps = np.angle(np.roots([1.0, -a, -b]))
+        return np.sort(2 / dt * np.tan(steps / 2) + Ω)
+
+    coarse, fine = frequencies(16), frequencies(32)
+    assert (np.abs(np.log2((coarse - np.sort(exact)) / (fine - np.sort(exact))) - 2) < 0.1).all()
+    assert np.abs((4 * fine - coarse) / 3 - np.sort(exact)).max() < 1e-4
 
 
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), SECTION, name="arm")

@@ -12,6 +12,7 @@ import ufl
 
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import StatementOnCell
+from ufl_beam.blocks.moving_loads import moving_loads
 from ufl_beam.blocks.nodes_in_space import change, new_state, quaternion, unknowns, vector
 from ufl_beam.blocks.spatial_beams import FIRST, StatementInSpace, matrix_of
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
@@ -30,7 +31,14 @@ from ufl_beam.mechanics.spatial_kinematics import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
 from ufl_beam.model.functions import steady
-from ufl_beam.model.loads import FollowerLoad, LoadAtPlace, PointLoad, Pressure, RotatingFrame
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    LoadAtPlace,
+    MovingLoad,
+    PointLoad,
+    Pressure,
+    RotatingFrame,
+)
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.terms.dead_loads import loaded_cells
 
@@ -190,14 +198,21 @@ def loads_in_space(setting: BlockSetting) -> list[Block]:
     """Return the blocks of the loads of a scene in space, besides dead forces."""
     loads = setting.scene.loads
     moments = [x for x in loads if isinstance(x, PointLoad) and np.any(x.moment)]
+    moving = [x for x in loads if isinstance(x, MovingLoad)]
     followers = [x for x in loads if isinstance(x, FollowerLoad)]
     made = [
         *_at_nodes("dead moments", moments, setting),
         *_at_nodes("follower loads", followers, setting),
         *_pressures([x for x in loads if isinstance(x, Pressure)], setting),
         *_rotations([x for x in loads if isinstance(x, RotatingFrame)], setting),
+        *(moving_loads(moving, setting) if moving else ()),
     ]  # fmt: skip
-    return [LoadsInSpace(*some, setting, supplies="loads") for some in made]
+    return [
+        (LoadsInSpace if isinstance(statement, StatementInSpace) else Block)(
+            statement, elements, setting, supplies="loads"
+        )
+        for statement, elements in made
+    ]
 
 
 def _at_nodes(

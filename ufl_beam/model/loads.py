@@ -42,7 +42,6 @@ from ufl_beam.model.records import (
     Positive,
     Record,
     Switch,
-    Vector,
     VectorOfScene,
     require_moment,
 )
@@ -344,9 +343,9 @@ class MovingLoad(Load):
             the one before ends.
         position: Distance from the start of the first beam along the undeformed axis, a function of
             time t (s); m.  The force acts while it is between zero and the length of the beams.
-        force: (F_x, F_y); N.
+        force: (F_x, F_y), in space (F_x, F_y, F_z); N.
         amplitude: Factor on the force, a function of time t (s).
-        mass: Mass that moves with the force; kg.
+        mass: Mass that moves with the force, in the plane; kg.
 
     Raises:
         ModelError: A beam does not start where the one before ends.
@@ -361,7 +360,7 @@ class MovingLoad(Load):
 
     beam: Annotated[Member | Sequence[Member], require_route]
     position: Timed
-    force: Vector = (0.0, 0.0)
+    force: VectorOfScene = (0.0, 0.0)
     amplitude: Timed = steady
     _: KW_ONLY
     mass: NotNegative = 0.0

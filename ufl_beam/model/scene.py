@@ -406,7 +406,7 @@ class Scene(Record, Rich):
 IN_SPACE = (
     Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
     Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, FollowerLoad, LineLoad, Pressure,
-    Gravity, RotatingFrame, Velocity,
+    MovingLoad, Gravity, RotatingFrame, Velocity,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
 
@@ -421,6 +421,8 @@ def require_space(scene: Scene) -> None:
                 f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in "
                 f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
             )
+        if isinstance(record, MovingLoad) and record.mass:
+            raise ModelError(f"{record}: masses that move along beams are for scenes in the plane")
         law = getattr(record, "law", None)
         if has_friction(law) or isinstance(law, RigidPlastic):
             raise ModelError(
