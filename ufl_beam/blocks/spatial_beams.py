@@ -15,14 +15,15 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import alike
 from ufl_beam.blocks.block import Block, BlockSetting, Elements
 from ufl_beam.blocks.nodes_in_space import (
+    FIRST,
+    StatementInSpace,
     change,
+    matrix_of,
     new_state,
     quaternion,
-    quaternion_names,
-    unknowns,
     vector,
 )
-from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import (
@@ -46,29 +47,8 @@ from ufl_beam.mechanics.spatial_kinematics import (
     times,
     transposed_times,
 )
-from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
+from ufl_beam.mechanics.time_scheme import acts_at_end, has_inertia
 from ufl_beam.terms.term import Callbacks, Phases
-
-
-@dataclass(frozen=True)
-class StatementInSpace(Statement):
-    """Statement on nodes in space.
-
-    Attributes:
-        scheme: Time scheme.
-    """
-
-    scheme: Scheme
-
-    @property
-    def unknowns(self) -> list[str]:
-        """Names of the unknowns of all nodes, component by component."""
-        return unknowns(self.nodes)
-
-    @property
-    def state(self) -> list[str]:
-        """Quaternions of the nodes."""
-        return [x for k in range(self.nodes) for x in quaternion_names(k)]
 
 
 @dataclass(frozen=True)
@@ -183,15 +163,6 @@ class ElasticCellInSpace(StatementInSpace):
 
 def _same(x: Expr) -> Expr:
     return x
-
-
-FIRST = 1.0, 0.0, 0.0
-"""Axis 1 of a cell, in its axes."""
-
-
-def matrix_of(at: Inputs, name: str) -> tuple[Vector, ...]:
-    """Return a matrix among the numbers; the rows of R are the axes of the cell."""
-    return tuple(tuple(at[f"{name}{i}{j}"] for j in range(3)) for i in range(3))
 
 
 def _strains(middle: Middle, slope: Vector, axes: Any, h: Expr) -> Vector:

@@ -13,8 +13,16 @@ import ufl
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import StatementOnCell
 from ufl_beam.blocks.moving_loads import moving_loads
-from ufl_beam.blocks.nodes_in_space import change, new_state, quaternion, unknowns, vector
-from ufl_beam.blocks.spatial_beams import FIRST, StatementInSpace, matrix_of
+from ufl_beam.blocks.nodes_in_space import (
+    FIRST,
+    StatementInSpace,
+    change,
+    matrix_of,
+    new_state,
+    quaternion,
+    unknowns,
+    vector,
+)
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
