@@ -27,6 +27,7 @@ from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.spatial_kinematics import (
+    Middle,
     Turn,
     add,
     between,
@@ -74,8 +75,14 @@ class LoadOnNode(StatementInSpace):
         """Moment, and force of a load that follows, in the undeformed scene."""
         return [f"{x}{i}" for x in "MF"[: 1 + self.follows] for i in range(3)]
 
+    @property
+    def state(self) -> list[str]:
+        """Quaternion; if the equation holds at the end of a step, the loads at the last end."""
+        before = [f"last {x}" for x in self.numbers] if acts_at_end(self.scheme) else []
+        return [*before, *super().state]
+
     def equations(self, at: Inputs) -> Equations:
-        """See the base class."""
+        """See the base class; the work in statics is of the mean load on the rotation vector."""
         turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
         M, *F = (
             scale(at["factor"], tuple(at[f"{x}{i}"] for i in range(3)))
@@ -84,9 +91,18 @@ class LoadOnNode(StatementInSpace):
         forces: Sequence[Any] = NO_FORCE
         if self.follows:
             frame = matrix(between(at.stage, turn.q0, turn.q1, self.scheme.load_weight))
-            M, forces = times(frame, M), scale(-1.0, times(frame, F[0]))
+            M, F = times(frame, M), [times(frame, F[0])]
+            forces = scale(-1.0, F[0])
         on_node = turn.on_node(M, at_end=acts_at_end(self.scheme))
-        return Equations([*forces, *scale(-1.0, on_node)], new_state([turn]))
+        made = Equations([*forces, *scale(-1.0, on_node)], new_state([turn]))
+        if not acts_at_end(self.scheme):
+            return made
+        turned = times(turn.frame, Middle(at.stage, turn.q0, turn.q1).rotation_vector)
+        moved, loads = (*turned, *change(at, "xyz", 0)), (M, *F)
+        now = dict(zip(self.state, (x for load in loads for x in load), strict=False))
+        pairs = zip(now.items(), moved, strict=False)
+        work = sum(0.5 * (at[name] + x) * way for (name, x), way in pairs)
+        return made._replace(state=now | {**made.state}, supplied={"loads": work})
 
 
 @dataclass(frozen=True)
@@ -202,6 +218,11 @@ class LoadsInSpace(Block):
     remembers = True
 
 
+def own_work(statement: Statement) -> bool:
+    """Return whether a statement has the work of its load, as moments at the end of a step."""
+    return isinstance(statement, LoadOnNode) and acts_at_end(statement.scheme)
+
+
 def loads_in_space(setting: BlockSetting) -> list[Block]:
     """Return the blocks of the loads of a scene in space, besides dead forces."""
     loads = setting.scene.loads
@@ -217,7 +238,7 @@ def loads_in_space(setting: BlockSetting) -> list[Block]:
     ]  # fmt: skip
     return [
         (LoadsInSpace if isinstance(statement, StatementInSpace) else Block)(
-            statement, elements, setting, supplies="loads"
+            statement, elements, setting, supplies=None if own_work(statement) else "loads"
         )
         for statement, elements in made
     ]
