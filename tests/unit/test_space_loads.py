@@ -325,6 +325,29 @@ def test_a_spinning_body_with_a_follower_force():
     assert run.energy.worst < 1e-13
 
 
+def test_a_load_that_is_added_follows_the_rotation():
+    """In a run with start=, a new load begins with the rotation of its place in the earlier run."""
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=3)
+    spin = ub.Velocity([beam], angular=(1, 2, -1), linear=(0, 0, 0), about=(0, 0, 0))
+
+    def run(begin, end, amplitude, start=None):
+        loads = [
+            ub.FollowerLoad(beam.end, force=(1, 5, -2), moment=(3, 0, 9), amplitude=amplitude),
+            ub.Pressure(beam, normal=(4, -3), amplitude=amplitude),
+        ]
+        scene = ub.Scene([beam], loads=loads, initial=[spin])
+        return ub.simulate(
+            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, start=start, progress=False
+        ).displacement(beam.end)[-1]
+
+    whole = run(0, 2, lambda t: t > 1)
+    scene = ub.Scene([beam], initial=[spin])
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / 32, progress=False)
+    assert np.linalg.norm(first.displacement(beam.end)[-1, 3:]) > 1
+    second = run(1, 2, lambda t: 1.0, first)
+    assert np.abs(second - whole).max() < 1e-9
+
+
 def machine():
     """A driven beam with a spinning wheel, follower loads, and pressures in both directions."""
     root = ub.Beam((0, 0, 0), (0, 0, 2), SECTION, cells=3, up=(1, 0, 0))

@@ -21,7 +21,7 @@ from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosi
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
 from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space
-from ufl_beam.blocks.spatial_loads import loads_in_space
+from ufl_beam.blocks.spatial_loads import LoadsInSpace, loads_in_space
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -257,8 +257,8 @@ class StepEquation:
                 load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
-        if self.supports.hinges and not same:
-            self._find_angles(t)
+        if self.nodes_in_space and not same:
+            self._take_turns(t, q)
         if self.inertia is not None and same:
             known = sum(name in internal for name in self.inertia.scheme.further_rates)
             self.inertia.carry_on(archive, known)
@@ -266,7 +266,8 @@ class StepEquation:
                 self._pass_on_step(archive, q)
         return unknown
 
-    def _find_angles(self, t: float) -> None:
+    def _take_turns(self, t: float, q: Array) -> None:
+        """Let loads and supports of another scene begin with the rotations of the nodes."""
         numbering = self.subdomain.numbering
         turns: Array = np.zeros((1, len(numbering.points) + len(numbering.scene.rigid_bodies), 4))
         for term in self.nodes_in_space:
@@ -277,6 +278,12 @@ class StepEquation:
             return np.asarray(turns_at(numbering, support.place, turns).as_rotvec()[0])
 
         self.supports.find_angles(rotation_vector, t)
+        at_dofs: Array = np.zeros((len(q), 4))
+        at_dofs[np.vstack([numbering.dofs, numbering.dofs_of_bodies])[:, 3]] = turns[0]
+        for load in self.loads:
+            if isinstance(load, LoadsInSpace):
+                load.take_turns(at_dofs)
+                load.carry_on(t, q, None, None)
 
     def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""
@@ -323,8 +330,9 @@ class StepEquation:
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         step = Step.create(self.scheme, 0.0, short, short, q)
-        self.begin(step._replace(fraction=0.0), self.beams)  # imposed strains remain
-        for beam in self.beams:
+        beams: list[Term] = [*self.beams, *self.in_space]
+        self.begin(step._replace(fraction=0.0), beams)  # imposed strains remain
+        for beam in beams:
             beam.add_residual(q, forces)
         if t is not None:
             step = Step.create(self.scheme, t, t + 1.0, t + 1.0, q)
