@@ -453,10 +453,10 @@ WRONG = {
         lambda: ub.Scene([PLANAR], loads=[ub.PointLoad(PLANAR.end, moment=(0, 0, 1))]),
         "must have 1 components",
     ),
-    "load at an arm": (
+    "follower at an arm": (
         lambda: ub.Scene(
-            bodies=[BALL], loads=[ub.PointLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
-        ), "act at their centres",
+            bodies=[BALL], loads=[ub.FollowerLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
+        ), "not the centre of the body",
     ),
     "rigid-plastic law": (
         lambda: ub.Scene([BEAM], connectors=[
@@ -464,8 +464,8 @@ WRONG = {
                      axis=(0, 1, 0))
         ]), "RigidPlastic is a law for scenes in the plane",
     ),
-    "planar support": (
-        lambda: ub.Scene([BEAM], supports=[ub.Roller(BEAM.end)]), "Roller is for scenes",
+    "moving mass": (
+        lambda: ub.Scene([BEAM], loads=[ub.MovingLoad(BEAM, abs, mass=1.0)]), "masses that move",
     ),
     "revolute without axis": (
         lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start), "give axis=(x, y, z)",

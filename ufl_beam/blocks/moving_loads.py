@@ -13,6 +13,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import StatementOnCell, places, positions
+from ufl_beam.blocks.nodes_in_space import unknowns
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.cell_functions import AxisOfCell, Cell
@@ -74,6 +75,40 @@ class MovingForce(_OnRoute):
 
         forces = [-force for force in applied(at["reached"]).values()]
         return Equations([*forces, *[ufl.as_ufl(0.0)] * self.nodes], applied(at["fraction"]))
+
+
+@dataclass(frozen=True)
+class MovingForceInSpace(MovingForce):
+    """The same in space, on the displacements of both nodes of a cell."""
+
+    @property
+    def unknowns(self) -> list[str]:
+        """Displacements of both nodes, component by component."""
+        return unknowns(2)[:6]
+
+    @property
+    def numbers(self) -> tuple[str, ...]:
+        """Force for a factor of 1 (N), and distances of the cell."""
+        return *(f"force {c}" for c in "xyz"), *ON_ROUTE
+
+    @property
+    def state(self) -> list[str]:
+        """Applied forces on the nodes; N."""
+        return [f"applied {x}" for x in self.unknowns]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class."""
+        acts = ufl.And(ufl.gt(at["place"], at["low"]), ufl.le(at["place"], at["high"]))
+        s = (at["place"] - at["first"]) / (at["last"] - at["first"])
+        here = ufl.conditional(acts, at["factor"], 0.0)
+        wanted = [here * at[f"force {c}"] * share for c in "xyz" for share in (1.0 - s, s)]
+
+        def applied(part: Expr) -> list[Expr]:
+            pairs = zip(self.state, wanted, strict=True)
+            return [(1.0 - part) * at[x] + part * force for x, force in pairs]
+
+        state = dict(zip(self.state, applied(at["fraction"]), strict=True))
+        return Equations([-force for force in applied(at["reached"])], state)
 
 
 @dataclass(frozen=True)
@@ -170,7 +205,8 @@ def moving_loads(
 ) -> Iterator[tuple[Statement, Elements]]:
     """Yield statements and elements of the forces of loads, then of their masses in dynamics."""
     degree, scheme = setting.subdomain.numbering.mesh.degree, setting.scheme
-    yield MovingForce(degree), _elements("moving forces", loads, setting, heavy=False)
+    force = MovingForceInSpace if setting.scene.in_space else MovingForce
+    yield force(degree), _elements("moving forces", loads, setting, heavy=False)
     heavy = [load for load in loads if load.mass]
     if heavy and has_inertia(scheme):
         yield MovingMass(degree, scheme), _elements("moving masses", heavy, setting, heavy=True)
@@ -190,7 +226,7 @@ def _elements(
         acts[0] = np.nextafter(0.0, -1.0)  # the start of the route belongs to its first cell
         if heavy:  # its ends act for all distances beyond
             acts[[0, -1]] = -np.inf, np.inf
-        given = (load.mass, ends[-1]) if heavy else load.force
+        given = (load.mass, ends[-1]) if heavy else (*load.force, 0.0)[: numbering.displacements]
         numbers = np.tile([k, *given], (len(cells), 1)), acts[:-1], acts[1:], ends[:-1], ends[1:]
         rows.append(np.column_stack([local[cells], *numbers])[local[cells] >= 0])
     table = np.concatenate(rows).T
@@ -198,10 +234,14 @@ def _elements(
     wanted = {"place": ("position", "whole"), "factor": ("amplitude", "whole")}
     if heavy:
         wanted = {f"place {time}": ("position", time) for time in NEAR}
+    # In space there are forces on displacements only, and section forces follow from strains
+    dofs, in_space = subdomain.cell_dofs[cells], setting.scene.in_space
     return Elements(
-        name, subdomain.cells[cells] + len(numbering.cells) * of_load, subdomain.cell_dofs[cells],
-        [*table[2:], *positions(subdomain, cells)],
+        name, subdomain.cells[cells] + len(numbering.cells) * of_load,
+        dofs[:, :6] if in_space else dofs,
+        [*table[2:], *(() if in_space else positions(subdomain, cells))],
         [InTime(getattr(x, name), x, time) for name, time in wanted.values() for x in loads],
-        {name: k * len(loads) + of_load for k, name in enumerate(wanted)}, cells,
+        {name: k * len(loads) + of_load for k, name in enumerate(wanted)},
+        None if in_space else cells,
         groups=of_load, number_of_groups=len(loads) * heavy,
     )  # fmt: skip

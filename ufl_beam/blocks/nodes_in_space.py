@@ -10,11 +10,13 @@ no rotations.  Quaternions of nodes are states of the elements.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from ufl.core.expr import Expr
 
-from ufl_beam.blocks.statement import Inputs
+from ufl_beam.blocks.statement import Inputs, Statement
 from ufl_beam.mechanics.spatial_kinematics import Turn, Vector, product, subtract
+from ufl_beam.mechanics.time_scheme import Scheme
 
 UNKNOWNS = "xyzabc"
 """Displacements along the axes of the scene, then rotations about axes of the node."""
@@ -59,3 +61,33 @@ def new_state(turns: Sequence[Turn], to_node: Vector | None = None) -> dict[str,
         q = turn.normal if to_node is None else product(turn.normal, to_node)
         found |= zip(quaternion_names(k), (q[0] - 1.0, *q[1:]), strict=True)
     return found
+
+
+@dataclass(frozen=True)
+class StatementInSpace(Statement):
+    """Statement on nodes in space.
+
+    Attributes:
+        scheme: Time scheme.
+    """
+
+    scheme: Scheme
+
+    @property
+    def unknowns(self) -> list[str]:
+        """Names of the unknowns of all nodes, component by component."""
+        return unknowns(self.nodes)
+
+    @property
+    def state(self) -> list[str]:
+        """Quaternions of the nodes."""
+        return [x for k in range(self.nodes) for x in quaternion_names(k)]
+
+
+FIRST = 1.0, 0.0, 0.0
+"""Axis 1 of a cell, in its axes."""
+
+
+def matrix_of(at: Inputs, name: str) -> tuple[Vector, ...]:
+    """Return a matrix among the numbers; the rows of R are the axes of the cell."""
+    return tuple(tuple(at[f"{name}{i}{j}"] for j in range(3)) for i in range(3))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Statements of beams in space: elastic cells with the rotation of their mass, dead moments."""
+"""Statements of beams and bodies in space: elastic cells, and the rotation of masses."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import alike
-from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import Block, BlockSetting, Elements
 from ufl_beam.blocks.nodes_in_space import (
+    FIRST,
+    StatementInSpace,
     change,
+    matrix_of,
     new_state,
     quaternion,
-    quaternion_names,
-    unknowns,
     vector,
 )
-from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill, lib, loop, struct
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import (
@@ -48,37 +49,8 @@ from ufl_beam.mechanics.spatial_kinematics import (
     times,
     transposed_times,
 )
-from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
-from ufl_beam.model.loads import PointLoad
+from ufl_beam.mechanics.time_scheme import acts_at_end, has_inertia
 from ufl_beam.terms.term import Callbacks, Phases
-
-
-@dataclass(frozen=True)
-class StatementInSpace(Statement):
-    """Statement on nodes in space.
-
-    Attributes:
-        scheme: Time scheme.
-    """
-
-    scheme: Scheme
-
-    @property
-    def unknowns(self) -> list[str]:
-        """Names of the unknowns of all nodes, component by component."""
-        return unknowns(self.nodes)
-
-    @property
-    def state(self) -> list[str]:
-        """Quaternions of the nodes."""
-        return [x for k in range(self.nodes) for x in quaternion_names(k)]
-
-    def spin(self, at: Inputs, k: int) -> Vector:
-        """Return the angular velocity of a node after the step."""
-        known = [change(at, "abc", k)]
-        known += [vector(at, f"rate{j + 1}", "abc", k) for j in range(self.rates)]
-        parts = [scale(at[f"rates 0 {j}"], x) for j, x in enumerate(known)]
-        return reduce(add, parts)
 
 
 @dataclass(frozen=True)
@@ -94,6 +66,13 @@ class InertiaInSpace(StatementInSpace):
     def of_step(self) -> list[str]:
         """Length of the step, and coefficients of its rates."""
         return ["dt", *(f"rates 0 {j}" for j in range(1 + self.rates))] if self.rates else []
+
+    def spin(self, at: Inputs, k: int) -> Vector:
+        """Return the angular velocity of a node after the step."""
+        known = [change(at, "abc", k)]
+        known += [vector(at, f"rate{j + 1}", "abc", k) for j in range(self.rates)]
+        parts = [scale(at[f"rates 0 {j}"], x) for j, x in enumerate(known)]
+        return reduce(add, parts)
 
 
 @dataclass(frozen=True)
@@ -129,7 +108,7 @@ class ElasticCellInSpace(InertiaInSpace):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
-        h, axes, at_end = at["h"], _matrix(at, "R"), acts_at_end(self.scheme)
+        h, axes, at_end = at["h"], matrix_of(at, "R"), acts_at_end(self.scheme)
         q0 = [quaternion(at, k) for k in (0, 1)]
         turns = [Turn(at.stage, change(at, "abc", k), q0[k]) for k in (0, 1)]
         u = [[vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
@@ -200,7 +179,10 @@ class ElasticCellInSpace(InertiaInSpace):
 
     def _turning(self, at: Inputs, own: Sequence[Vector]) -> list[Vector]:
         """Return the moments by which the momenta of the nodes turn."""
-        momenta, found = [times(_matrix(at, "J"), self.spin(at, k)) for k in (0, 1)], list[Vector]()
+        momenta, found = (
+            [times(matrix_of(at, "J"), self.spin(at, k)) for k in (0, 1)],
+            list[Vector](),
+        )
         for k, m in enumerate(own):
             sums = add(scale(2.0, momenta[k]), momenta[1 - k])
             P = tuple(map(at.stage, scale(at["h"] / 6, sums)))
@@ -214,14 +196,6 @@ def _same(x: Expr) -> Expr:
 
 LAST_CHANGES = *(f"change {k}" for k in range(6)), "last dt"
 """States of :class:`~ufl_beam.EnergyMomentumDecaying`: changes of strains, length of the step."""
-
-FIRST = 1.0, 0.0, 0.0
-"""Axis 1 of a cell, in its axes."""
-
-
-def _matrix(at: Inputs, name: str) -> tuple[Vector, ...]:
-    """Return a matrix among the numbers; the rows of R are the axes of the cell."""
-    return tuple(tuple(at[f"{name}{i}{j}"] for j in range(3)) for i in range(3))
 
 
 def _strains(middle: Middle, slope: Vector, axes: Any, h: Expr) -> Vector:
@@ -288,24 +262,6 @@ class CellsInSpace(Block):
         return super().phases(callbacks)._replace(change=loop("change_of_cells", self._c))
 
 
-@dataclass(frozen=True)
-class DeadMoment(StatementInSpace):
-    """Moment at a node with a constant direction; it is not conservative."""
-
-    nodes = 1
-    numbers = "m0", "m1", "m2"
-    of_step = ("factor",)
-
-    def equations(self, at: Inputs) -> Equations:
-        """See the base class."""
-        turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
-        M = scale(at["factor"], tuple(at[f"m{i}"] for i in range(3)))
-        forces = [ufl.as_ufl(0.0)] * 3 + [
-            -x for x in turn.on_node(M, at_end=acts_at_end(self.scheme))
-        ]
-        return Equations(forces, new_state([turn]))
-
-
 def turned_momentum(m: Vector, P: Vector, dt: Expr) -> Vector:
     """Return the moment by which a momentum P in axes of a node turns in a step."""
     first = cross(m, P)
@@ -326,7 +282,7 @@ class TurningBody(InertiaInSpace):
         state = new_state([Turn(at.stage, m, quaternion(at, 0))])
         if not self.rates:
             return Equations([*none, *none], state)
-        P = times(_matrix(at, "J"), self.spin(at, 0))
+        P = times(matrix_of(at, "J"), self.spin(at, 0))
         return Equations([*none, *turned_momentum(m, P, at["dt"])], state)
 
 
@@ -355,22 +311,3 @@ def bodies_in_space(setting: BlockSetting) -> list[BodiesInSpace]:
     elements = Elements("bodies in space", np.arange(len(bodies)), nodes, [*numbers])
     statement = TurningBody(setting.scheme)
     return [BodiesInSpace(statement, elements, setting, kind="inertia")]
-
-
-class DeadMoments(Block):
-    """Moments at nodes, whose rotations are states."""
-
-    remembers = True
-
-
-def dead_moments(setting: BlockSetting) -> list[Block]:
-    """Return the block of moments at places, if there are any."""
-    subdomain = setting.subdomain
-    loads = [x for x in setting.scene.loads if isinstance(x, PointLoad) and np.any(x.moment)]
-    if not loads:
-        return []
-    nodes = np.array([subdomain.local(subdomain.numbering.node(load.place)) for load in loads])
-    moments, mine = np.array([load.moment for load in loads], float), np.arange(len(loads))
-    in_time = [InTime(load.amplitude, load) for load in loads]
-    elements = Elements("dead moments", mine, nodes, [*moments.T], in_time, {"factor": mine})
-    return [DeadMoments(DeadMoment(setting.scheme), elements, setting, supplies="loads")]

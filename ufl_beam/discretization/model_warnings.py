@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain, pairwise
 
 import numpy as np
@@ -24,7 +24,7 @@ from ufl_beam.model.functions import value_at
 from ufl_beam.model.joints import Release
 from ufl_beam.model.loads import Gravity, MovingLoad
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.supports import COMPONENTS
+from ufl_beam.model.supports import Support
 
 TOUCHING = 1e-3
 """Largest gap between vertices that touch, as a fraction of the length of the shorter beam."""
@@ -280,17 +280,22 @@ def _outside(point: Array, points: Array) -> float:
     return float(np.linalg.norm(beyond))
 
 
-def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -> None:
+def warn_of_jumps(
+    numbering: DofNumbering, t: float, q: Array, motions: Array, angles: Mapping[Support, float]
+) -> None:
     """Warn of prescribed motions in dynamics that differ from the state ``q`` at the time ``t``.
 
     ``motions`` are the relative motions of the connectors in this state; (num_connectors,).
+    ``angles`` are rotations of supports about axes in space.
     """
     starts = list[tuple[str, float, float, bool]]()
     for s in numbering.scene.supports:
         x = q[numbering.node(s.place)]
-        x[:2] = turned(x[:2], np.full(1, -s.angle))[0]
-        moving = s.moving.items()
-        starts += [(f"{s}: {COMPONENTS[c]}", x[c], value_at(f, t, s), c == 2) for c, f in moving]
+        for i, j, angle in s.turns:
+            x[[i, j]] = turned(x[[i, j]], np.full(1, -angle))[0]
+        for k, f in s.moving.items():
+            value = angles.get(s, x[k]) if k == 5 else x[k]
+            starts.append((f"{s}: {s.names[k]}", value, value_at(f, t, s), k >= s.displacements))
     for c, motion in zip(numbering.scene.all_connectors, motions, strict=True):
         if isinstance(c.law, PrescribedMotion) and c.law is not RIGID:
             target = value_at(c.law.motion, t, c)

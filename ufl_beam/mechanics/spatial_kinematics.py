@@ -102,6 +102,12 @@ def transposed_times(R: Sequence[Vector], a: Vector) -> Vector:
     return tuple(sum(R[i][j] * a[i] for i in range(3)) for j in range(3))
 
 
+def between(stage: Callable[[Any], Any], q0: Vector, q1: Vector, fraction: float = 0.5) -> Vector:
+    """Return a rotation between two unit quaternions; the angle of the middle is exact."""
+    q = add(scale(1.0 - fraction, q0), scale(fraction, q1))
+    return scale(stage(1 / ufl.sqrt(dot(q, q))), q)
+
+
 class Turn:
     """Rotation of a node in a step.
 

@@ -33,7 +33,7 @@ from ufl_beam.model.bodies import (
     moves_with_node,
 )
 from ufl_beam.model.connector_laws import PrescribedForce
-from ufl_beam.model.connectors import Component, Connector
+from ufl_beam.model.connectors import Component, Connector, axes_of
 from ufl_beam.model.functions import Table, Timed, TimeFunction, steady, value_at
 from ufl_beam.model.records import (
     Instance,
@@ -42,7 +42,6 @@ from ufl_beam.model.records import (
     Positive,
     Record,
     Switch,
-    Vector,
     VectorOfScene,
     require_moment,
 )
@@ -103,10 +102,10 @@ class PointLoad(LoadAtPlace):
         """Connectors that apply a load away from the centre of a body; otherwise empty."""
         if moves_with_node(self.place):
             return ()
-        (x, y), fixed = self.force, ground(*self.place.point)
-        components = [("parting", x, (1.0, 0.0)), ("parting", y, (0.0, 1.0))]
-        components += [("turning", self.moment, (1.0, 0.0))] * bool(self.moment)
-        connectors = []
+        fixed, axes, connectors = ground(*self.place.point), axes_of(self.place.point), []
+        components: list[Any] = [("parting", *x) for x in zip(self.force, axes, strict=False)]
+        if len(axes) == 2 and self.moment:  # in space, moments of bodies do not depend on the place
+            components.append(("turning", self.moment, axes[0]))
         for motion, size, axis in components:
 
             def push(t: float, size: float = size) -> float:
@@ -254,6 +253,13 @@ class LineLoad(LoadAlongBeam):
     amplitude: Timed = steady
 
 
+def require_normal(normal: object, what: str) -> float | tuple[float, float]:
+    """Return a pressure as a number, or as two numbers in space, or raise."""
+    if np.ndim(normal) == 0:  # type: ignore[arg-type]
+        return checks.require_number(normal, what)
+    return checks.require_vector(normal, what)
+
+
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class Pressure(LoadAlongBeam):
@@ -264,7 +270,9 @@ class Pressure(LoadAlongBeam):
 
     Args:
         beam: Loaded beam.
-        normal: Force along the normal, which points to the left of the direction of the beam; N/m.
+        normal: Force along the normal, which points to the left of the direction of the beam; in
+            space two forces, normal to the deformed axis in the directions of the axes 2 and 3 of
+            the section; N/m.
         tangential: Force along the axis, in the direction of the beam; N/m.
         amplitude: Factor on both forces, a function of time t (s).
         span: As in :class:`LineLoad`.
@@ -282,7 +290,7 @@ class Pressure(LoadAlongBeam):
         0.14 N, 2000 N
     """
 
-    normal: Number = 0.0
+    normal: Annotated[Any, require_normal] = 0.0
     tangential: Number = 0.0
     amplitude: Timed = steady
 
@@ -335,9 +343,9 @@ class MovingLoad(Load):
             the one before ends.
         position: Distance from the start of the first beam along the undeformed axis, a function of
             time t (s); m.  The force acts while it is between zero and the length of the beams.
-        force: (F_x, F_y); N.
+        force: (F_x, F_y), in space (F_x, F_y, F_z); N.
         amplitude: Factor on the force, a function of time t (s).
-        mass: Mass that moves with the force; kg.
+        mass: Mass that moves with the force, in the plane; kg.
 
     Raises:
         ModelError: A beam does not start where the one before ends.
@@ -352,7 +360,7 @@ class MovingLoad(Load):
 
     beam: Annotated[Member | Sequence[Member], require_route]
     position: Timed
-    force: Vector = (0.0, 0.0)
+    force: VectorOfScene = (0.0, 0.0)
     amplitude: Timed = steady
     _: KW_ONLY
     mass: NotNegative = 0.0
@@ -417,8 +425,8 @@ class RotatingFrame(Load):
     :class:`MovingLoad` with a mass, on which these forces would not act.
 
     Args:
-        rate: Angular velocity of the frame, counter-clockwise; rad/s.
-        about: Centre of rotation; m.
+        rate: Angular velocity of the frame, counter-clockwise; in space a vector; rad/s.
+        about: Centre of rotation, or a point of its axis; m.
 
     Example:
         >>> blade = ub.Scene([beam], supports=scene.supports, loads=[ub.RotatingFrame(rate=50.0)])
@@ -427,8 +435,8 @@ class RotatingFrame(Load):
         True
     """
 
-    rate: Number
-    about: Vector = (0.0, 0.0)
+    rate: Annotated[Any, require_moment]
+    about: VectorOfScene = (0.0, 0.0)
 
     # A rate that varies in time would cause a further force, the Euler force.
     amplitude: ClassVar[TimeFunction] = steady  # type: ignore[misc]

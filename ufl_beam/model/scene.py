@@ -27,7 +27,6 @@ from ufl_beam.model.bodies import (
     Representatives,
     Velocity,
     merged,
-    moves_with_node,
     node,
 )
 from ufl_beam.model.checks import require_all
@@ -57,16 +56,18 @@ from ufl_beam.model.joints import (
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
+    FollowerLoad,
     Gravity,
     LineLoad,
     Load,
     LoadAtPlace,
     MovingLoad,
     PointLoad,
+    Pressure,
     RotatingFrame,
 )
 from ufl_beam.model.records import Record
-from ufl_beam.model.supports import COMPONENTS, Clamped, Pinned, Support
+from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
 
 
@@ -197,12 +198,14 @@ class Scene(Record, Rich):
                 f"{beam.name}: its ends have two coordinates, but other beams are in space; give "
                 "all points three coordinates"
             )
-        names = "force", "acceleration", "linear", "about", "moment", "angular"
+        sizes = dict.fromkeys(("force", "acceleration", "linear", "about"), d)
+        sizes |= dict.fromkeys(("moment", "angular", "rate"), 1 if d == 2 else 3) | {
+            "normal": d - 1
+        }
         records: list[Record] = [*self.loads, *self.initial]
         for record in records:
-            for name in names:
+            for name, wanted in sizes.items():
                 vector = getattr(record, name, None)
-                wanted = 1 if d == 2 and name in ("moment", "angular") else d
                 if vector is not None and np.any(vector) and np.size(vector) != wanted:
                     raise ModelError(
                         f"{record._label()}: {name} = {vector} must have {wanted} components, "
@@ -247,7 +250,7 @@ class Scene(Record, Rich):
         connectors += [c for x in self.connectors for c in x.components or (x,)]
         connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
-        bearing = [support.place for support in self.supports if 2 in support.held]
+        bearing = [support.place for support in self.supports if support.bears_moment]
         bearing += [mass.place for mass in self.masses if mass.inertia]
         for connector in connectors if laws else ():
             by_a, by_b = connector.rigidly()
@@ -353,7 +356,7 @@ class Scene(Record, Rich):
         """Raise unless the force of the bearing is computed, so that it can cause friction."""
         if bearing not in (*self.joints, *self.supports):
             why = "is not in the scene; add it to joints or supports"
-        elif isinstance(bearing, Support) and not bearing.held.keys() & {0, 1}:
+        elif isinstance(bearing, Support) and min(bearing.held) >= bearing.displacements:
             why = "holds no displacement and bears no force; name another support or joint"
         elif isinstance(bearing, Joint) and len(bearing.places) > 2:
             why = "has more than two places, so that it has no single force; make a joint of two"
@@ -385,25 +388,28 @@ class Scene(Record, Rich):
         return merged([*self.shared_by_joints, *hinges])
 
     def _require_single_supports(self) -> None:
-        same = self.representatives
-        holders = {same[GROUND, component]: "the ground" for component in range(3)}
+        def dof(member: Any, component: int) -> tuple[NodeDof, int]:
+            group = (0, 0, 0, 2, 2, 2)[component] if self.in_space else component
+            return self.representatives[member, group], component
+
+        holders = {dof(GROUND, c): "the ground" for c in range(6 if self.in_space else 3)}
         for support in self.supports:
-            # A support with rotated axes involves both displacements of its place.
-            components = {*support.held, *((0, 1) if support.angle else ())}
+            # A support with rotated axes involves all components that it rotates.
+            components = {*support.held, *(c for *pair, _ in support.turns for c in pair)}
             for component in sorted(components):
-                dof = same[node(support.place), component]
-                if dof in holders:
+                held = dof(node(support.place), component)
+                if held in holders:
                     raise ModelError(
-                        f"supports in conflict: {holders[dof]} and {support} both hold "
-                        f"{COMPONENTS[component]}; remove one"
+                        f"supports in conflict: {holders[held]} and {support} both hold "
+                        f"{support.names[component]}; remove one"
                     )
-                holders[dof] = str(support)
+                holders[held] = str(support)
 
 
 IN_SPACE = (
     Beam, Body, Rigid, Revolute, Spherical, Universal, Prismatic, Cylindrical, RigidLink, Link,
-    Turn, Stretch, Slide,
-    Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity,
+    Turn, Stretch, Slide, Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, FollowerLoad,
+    LineLoad, Pressure, MovingLoad, Gravity, RotatingFrame, Velocity,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
 
@@ -418,15 +424,12 @@ def require_space(scene: Scene) -> None:
                 f"{record._label()}: {type(record).__name__} is for scenes in the plane; scenes in "
                 f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
             )
+        if isinstance(record, MovingLoad) and record.mass:
+            raise ModelError(f"{record}: masses that move along beams are for scenes in the plane")
         law = getattr(record, "law", None)
         if isinstance(law, RigidPlastic):
             raise ModelError(
                 f"{record._label()}: {type(law).__name__} is a law for scenes in the plane"
-            )
-        if isinstance(record, PointLoad) and not moves_with_node(record.place):
-            raise ModelError(
-                f"{record._label()}: in space loads of bodies act at their centres; for a load at "
-                "an arm, join a short stiff beam to the body and load its end"
             )
     for beam in scene.beams:
         section = beam.section

@@ -5,16 +5,20 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
+from ufl_beam.arrays import Array
 from ufl_beam.display import bracketed
-from ufl_beam.errors import ModelError
+from ufl_beam.errors import ModelError, require_point
 from ufl_beam.model.bodies import NodeField
-from ufl_beam.model.checks import require_number, require_vector
+from ufl_beam.model.checks import require_number
 from ufl_beam.model.connector_laws import Bearing
+from ufl_beam.model.connectors import across
 from ufl_beam.model.functions import Constant, TimeFunction, require_time_function, still
 from ufl_beam.model.records import Record
 
@@ -23,15 +27,34 @@ COMPONENTS = ("u", "v", "psi")
 Motion = float | TimeFunction
 
 
-def require_direction(direction: object, what: str) -> tuple[float, float]:
+def require_direction(direction: object, what: str) -> tuple[float, ...]:
     """Return ``direction`` as a vector that is not zero, or raise."""
-    x, y = require_vector(direction, what)
-    if x == y == 0.0:
-        raise ModelError(f"{what} = (0, 0) is no direction")
-    return x, y
+    vector = require_point(direction, what)
+    if not any(vector):
+        raise ModelError(f"{what} = ({', '.join(f'{x:g}' for x in vector)}) is no direction")
+    return vector
 
 
-Direction = Annotated[tuple[float, float], require_direction]
+Direction = Annotated[Any, require_direction]
+
+
+def successive(rows: Array, first: int = 0) -> list[tuple[int, int, float]]:
+    """Return rotations, one after another, of components from ``first`` on into axes in space.
+
+    The axes are the rows of a matrix.  A rotation has two components, and the angle from the axis
+    of one to the axis of the other; rad.
+    """
+    found = list[tuple[int, int, float]]()
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        angle = math.atan2(rows[i, j], rows[i, i])
+        found.append((first + i, first + j, angle))
+        turn = np.eye(3)
+        turn[[i, j], [i, j]], turn[[i, j], [j, i]] = (
+            math.cos(angle),
+            math.sin(angle) * np.array([-1, 1]),
+        )
+        rows = rows @ turn
+    return [x for x in found if x[2]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,8 +64,9 @@ class Support(Bearing, Record, ABC):
     Attributes:
         place: Supported place: on a beam, or the centre of a body.
         held: Functions of time of the prescribed components: 0 and 1 are displacements in axes
-            turned by ``angle`` (m), 2 is the rotation (rad).
-        angle: Angle from the x axis to the axis of component 0; rad.
+            turned by ``angle`` (m), 2 is the rotation (rad).  In space, 0 to 2 are displacements,
+            and 3 to 5 rotations, in axes turned by ``turns``.
+        angle: Angle from the x axis to the axis of component 0, in the plane; rad.
 
     Example:
         >>> foot = ub.Clamped(beam.start)
@@ -54,8 +78,22 @@ class Support(Bearing, Record, ABC):
 
     place: NodeField
     angle: ClassVar[float] = 0.0
+    axis: ClassVar[Any] = None  # in space, of rotations, if those across it are held
 
     __repr__ = bracketed
+
+    @cached_property
+    def displacements(self) -> int:
+        """Number of components of the displacement, 2 or in space 3."""
+        return len(self.place.point)
+
+    @property
+    def turns(self) -> Sequence[tuple[int, int, float]]:
+        """Rotations of components, one after another, into the axes of the support.
+
+        Each has two components, and the angle (rad) between the axes of the first.
+        """
+        return [(0, 1, self.angle)] if self.angle else []
 
     def functions_of_time(self) -> Iterable[TimeFunction]:
         """See the base class."""
@@ -68,10 +106,26 @@ class Support(Bearing, Record, ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        self._require_directions()
         if not self.held:
-            raise ModelError(f"{self} holds nothing; give at least one of u, v, psi")
+            names = "u, v, psi" if self.displacements == 2 else "u, v, w, axis"
+            raise ModelError(f"{self} holds nothing; give at least one of {names}")
         for component, value in self.held.items():
-            require_time_function(value, f"{self}, {COMPONENTS[component]}")
+            require_time_function(value, f"{self}, {self.names[component]}")
+
+    def _require_directions(self) -> None:
+        """Raise :class:`ModelError` unless vectors have the components of the place."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the components in messages."""
+        across = ("rotation across the axis",) * 2
+        return COMPONENTS if self.displacements == 2 else ("u", "v", "w", *across, "psi")
+
+    @property
+    def bears_moment(self) -> bool:
+        """True if a rotation is held."""
+        return max(self.held) >= self.displacements
 
     @property
     def moving(self) -> dict[int, TimeFunction]:
@@ -91,7 +145,10 @@ class Clamped(Support):
         [0, 1, 2]
     """
 
-    held: ClassVar = {0: still, 1: still, 2: still}
+    @property
+    def held(self) -> dict[int, TimeFunction]:
+        """All components, fixed at zero."""
+        return dict.fromkeys(range(3 * self.displacements - 3), still)
 
 
 class Pinned(Support):
@@ -103,12 +160,17 @@ class Pinned(Support):
         [0, 1]
     """
 
-    held: ClassVar = {0: still, 1: still}
+    @property
+    def held(self) -> dict[int, TimeFunction]:
+        """The displacement, fixed at zero."""
+        return dict.fromkeys(range(self.displacements), still)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Roller(Support):
     """Roller support: holds the displacement across ``along``; the place rolls and turns freely.
+
+    In space ``along`` has three components, by default (1, 0, 0).
 
     Example:
         >>> roller = ub.Roller(beam.end, along=(1, 1))
@@ -124,15 +186,30 @@ class Roller(Support):
     _: KW_ONLY
     along: Direction = (1.0, 0.0)
 
+    def _require_directions(self) -> None:
+        _require_components(self, "along", Roller.along)
+
     @property
     def held(self) -> dict[int, TimeFunction]:
         """Displacement across ``along``, fixed at zero."""
-        return {0 if self.along[0] == 0.0 else 1: still}
+        free = np.flatnonzero(self.along)
+        return {
+            c: still for c in range(self.displacements) if c != (free[0] if len(free) == 1 else 0)
+        }
 
     @property
     def angle(self) -> float:  # type: ignore[override]
         """Direction in which the place rolls, or 0 if it rolls along x or y; rad."""
-        return math.atan2(self.along[1], self.along[0]) if all(self.along) else 0.0
+        turned = self.displacements == 2 and all(self.along)
+        return math.atan2(self.along[1], self.along[0]) if turned else 0.0
+
+    @property
+    def turns(self) -> Sequence[tuple[int, int, float]]:
+        """See the base class."""
+        if self.displacements == 2 or np.count_nonzero(self.along) == 1:
+            return super().turns
+        along = np.array(self.along) / math.hypot(*self.along)
+        return successive(np.array([along, *across(tuple(along))]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,15 +220,24 @@ class PrescribedDisplacement(Support):
     give a function such as ``lambda t: 0.1 * t``.  Components without a value are free.  The work
     of moving supports is the entry "supports" of ``energy.supplied``.
 
+    In space a support with an ``axis`` is a hinge: rotations across the axis are zero, and the
+    rotation about it is free, or ``psi``.  It may turn any number of times, in each step by less
+    than 135 degrees.
+
     Args:
         place: Supported place: on a beam, or the centre of a body.
         u: Displacement along x, or in the direction ``along``; m.
         v: Displacement along y, or to the left of the direction ``along``; m.
-        psi: Rotation; rad.
+        psi: Rotation, in space about ``axis``; rad.
         along: Direction of ``u``, for a support at an angle.
+        w: In space, displacement along z, or along the part of ``up`` across ``along``; m.
+        up: In space, vector that is upwards for a support at an angle: ``v`` is to the left of
+            ``along``, seen from its tip.
+        axis: In space, axis of the rotation, fixed in space and in the place.
 
     Raises:
-        ModelError: No component is prescribed, or ``along`` is zero.
+        ModelError: No component is prescribed; ``along`` or ``axis`` is zero; in space, ``up`` is
+            along ``along``, or there is a ``psi`` without axis.
 
     Example:
         >>> turned = ub.PrescribedDisplacement(
@@ -167,20 +253,69 @@ class PrescribedDisplacement(Support):
     v: Motion | None = None
     psi: Motion | None = None
     along: Direction = (1.0, 0.0)
+    w: Motion | None = None
+    up: Annotated[Any, require_direction] = None
+    axis: Annotated[Any, require_direction] = None  # type: ignore[misc]
+
+    def _require_directions(self) -> None:
+        _require_components(self, "along", PrescribedDisplacement.along)
+        if self.displacements == 2:
+            for name in ("w", "up", "axis"):
+                if getattr(self, name) is not None:
+                    raise ModelError(f"{self}: {name} is for scenes in space")
+        else:
+            object.__setattr__(self, "up", (0.0, 0.0, 1.0) if self.up is None else self.up)
+            for name in ("up", "axis"):
+                _require_components(self, name, None)
+            if self.psi is not None and self.axis is None:
+                raise ModelError(f"{self}: give the axis=(x, y, z) of the rotation psi")
+            size = math.hypot(*self.up) * math.hypot(*self.along)
+            if np.linalg.norm(np.cross(self.up, self.along)) <= 1e-9 * size:
+                raise ModelError(f"{self}: up is along the direction of u; give a vector across it")
 
     @property
     def angle(self) -> float:  # type: ignore[override]
-        """Direction of ``u``; rad."""
-        return math.atan2(self.along[1], self.along[0])
+        """Direction of ``u`` in the plane; rad."""
+        return math.atan2(self.along[1], self.along[0]) if self.displacements == 2 else 0.0
+
+    @property
+    def turns(self) -> Sequence[tuple[int, int, float]]:
+        """See the base class; the rotation is about the last axis."""
+        if self.displacements == 2:
+            return super().turns
+        along = np.array(self.along) / math.hypot(*self.along)
+        left = np.cross(self.up, along)
+        left /= math.hypot(*left)
+        found = successive(np.array([along, left, np.cross(along, left)]))
+        if self.axis is not None:
+            axis = np.array(self.axis) / math.hypot(*self.axis)
+            found += successive(np.array([*across(tuple(axis)), axis]), 3)
+        return found
 
     @cached_property
     def held(self) -> dict[int, TimeFunction]:
         """Functions of time of the prescribed components."""
         components: dict[int, TimeFunction] = {}
-        for component, value in enumerate((self.u, self.v, self.psi)):
+        across = (None if self.axis is None else 0.0,) * 2
+        in_space = self.displacements == 3
+        values = self.u, self.v, *((self.w, *across) if in_space else ()), self.psi
+        for component, value in enumerate(values):
             if callable(value):
                 components[component] = value
             elif value is not None:
-                number = require_number(value, f"{self}: {COMPONENTS[component]}")
+                number = require_number(value, f"{self}: {self.names[component]}")
                 components[component] = Constant(number)
         return components
+
+
+def _require_components(support: Any, name: str, default: object) -> None:
+    """Raise :class:`ModelError` unless a direction has the components of the scene.
+
+    The default of the plane becomes the x axis in space.
+    """
+    given, d = getattr(support, name), support.displacements
+    if given is default and d == 3 and default is not None:
+        given = (1.0, 0.0, 0.0)
+        object.__setattr__(support, name, given)
+    if given is not None and np.size(given) != d:
+        raise ModelError(f"{support}: {name} = {given} must have {d} components, as the place")

@@ -257,8 +257,7 @@ class StateWriter:
         constrained = [
             (numbering.node(support.place)[c], at["reactions"].start + numbering.width * k + c)
             for k, support in enumerate(numbering.scene.supports)
-            for held in support.held
-            for c in numbering.components(held)
+            for c in support.held
         ]
         dofs, to = np.array(constrained, dtype=np.int64).reshape(-1, 2).T
         owned = subdomain.owns(dofs)

@@ -464,6 +464,7 @@ class States:
     def reaction(self, support: Support) -> Array:
         """Return force (x, y) and moment of a support on the scene; (n+1, 3); N, N, N m.
 
+        In space, return force and moment along the axes of the scene; (n+1, 6).
         Reactions in directions that the support leaves free are zero.
 
         Each row belongs to the step that ends at its time.  In dynamics the first row is NaN.  In
@@ -476,8 +477,11 @@ class States:
         """
         index = index_of(self.scene.supports, support, "reaction: ")
         forces = self.column("reactions")[:, index]
-        if support.angle:
-            forces[:, :2] = turned(forces[:, :2], np.full(len(forces), support.angle))
+        for i, j, angle in reversed(support.turns):
+            forces[:, [i, j]] = turned(forces[:, [i, j]], np.full(len(forces), angle))
+        if support.axis is not None:
+            turns = turns_at(self.numbering, support.place, self.column(TURNS))
+            forces[:, 3:] = turns.apply(forces[:, 3:])
         return forces
 
     # -- forces of cells -----------------------------------------------------------------------

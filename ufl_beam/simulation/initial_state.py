@@ -47,7 +47,6 @@ from ufl_beam.model.constraint_checks import (
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.works import Effect
 from ufl_beam.output.output_files import version
 from ufl_beam.simulation.solution import Solution
@@ -325,9 +324,9 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
                 "or rad/s; give all joined parts velocities that agree"
             )
     supports = {
-        int(numbering.node(support.place)[k]): (support, c)
-        for support in numbering.scene.supports if not support.moving and not support.angle
-        for c in support.held for k in numbering.components(c)
+        int(numbering.node(support.place)[c]): (support, support.names[c])
+        for support in numbering.scene.supports if not support.moving and not support.turns
+        for c in support.held
     }  # fmt: skip
     moving = speeds > 1e-9 * speeds.max()
     for beam in (beam for velocity in numbering.scene.initial for beam in velocity.beams):
@@ -342,7 +341,7 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
                 f"Velocity: {beam.name} does not move, because {support} holds it; remove the "
                 "support or the velocity"
             )
-        names = ", ".join(COMPONENTS[c] for c in sorted({c for _, c in lost}))
+        names = ", ".join(x for x in support.names if x in {name for _, name in lost})
         warn(
             f"Velocity of {beam.name}: {support} prescribes {names}, so that the velocity at its "
             "place is zero from the start but the rest of the beam moves, which is an impact. Give "

@@ -193,7 +193,7 @@ class Simulation(Stepper):
         driven = any(isinstance(x, PrescribedMotion) and x is not RIGID for x in laws)
         if inertia is not None and (driven or scene.supports):
             motions = self.connections()[:, 0] if driven else np.zeros(len(laws))
-            together(warn_of_jumps, numbering, t0, q, motions)
+            together(warn_of_jumps, numbering, t0, q, motions, self.supports.angle_of)
 
     # -- impacts -------------------------------------------------------------------------------
 

@@ -20,10 +20,12 @@ from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
-from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space, dead_moments
+from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space
+from ufl_beam.blocks.spatial_loads import LoadsInSpace, loads_in_space
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.cells_in_space import turns_at
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -34,6 +36,7 @@ from ufl_beam.model.connector_laws import has_friction
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.loads import Rayleigh
+from ufl_beam.model.supports import Support
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.boundary_conditions import Supports
@@ -124,14 +127,15 @@ class StepEquation:
         self.in_space, self.nodes_in_space = list[CellsInSpace](), list[Any]()
         if scene.in_space:
             self.in_space = [CellsInSpace(fields, in_blocks)] if len(fields.order) else []
-            self.loads += dead_moments(in_blocks)
+            self.loads += loads_in_space(in_blocks)
             self.nodes_in_space += [*self.in_space, *bodies_in_space(in_blocks)]
             others += self.nodes_in_space[len(self.in_space) :]
         elif elastic.any():
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
-        self.loads += load_blocks(in_blocks)
+        if not scene.in_space:
+            self.loads += load_blocks(in_blocks)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
@@ -219,7 +223,7 @@ class StepEquation:
             has_friction(connector.law)
             for connector in self.subdomain.numbering.scene.all_connectors
         )
-        if self.inertia is None or self.supports.work or friction:
+        if self.inertia is None or self.supports.work or self.supports.hinges or friction:
             self.supports.carry_on(archive, q)
         if self.inertia is not None:
             self.inertia.carry_on(archive, len(self.inertia.more))
@@ -255,12 +259,33 @@ class StepEquation:
                 load.keep_states(archive)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
+        if self.nodes_in_space and not same:
+            self._take_turns(t, q)
         if self.inertia is not None and same:
             known = sum(name in internal for name in self.inertia.scheme.further_rates)
             self.inertia.carry_on(archive, known)
             if BEFORE in internal:
                 self._pass_on_step(archive, q)
         return unknown
+
+    def _take_turns(self, t: float, q: Array) -> None:
+        """Let loads and supports of another scene begin with the rotations of the nodes."""
+        numbering = self.subdomain.numbering
+        turns: Array = np.zeros((1, len(numbering.points) + len(numbering.scene.rigid_bodies), 4))
+        for term in self.nodes_in_space:
+            places, nodes = term.turns(numbering)
+            turns[0, nodes] = term.states.ravel()[places]
+
+        def rotation_vector(support: Support) -> Array:
+            return np.asarray(turns_at(numbering, support.place, turns).as_rotvec()[0])
+
+        self.supports.find_angles(rotation_vector, t)
+        at_dofs: Array = np.zeros((len(q), 4))
+        at_dofs[np.vstack([numbering.dofs, numbering.dofs_of_bodies])[:, 3]] = turns[0]
+        for load in self.loads:
+            if isinstance(load, LoadsInSpace):
+                load.take_turns(at_dofs)
+                load.carry_on(t, q, None, None)
 
     def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,10 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.mechanics.time_scheme import Scheme, Step
+from ufl_beam.errors import ModelError
+from ufl_beam.mechanics.time_scheme import Scheme, Step, acts_at_end
 from ufl_beam.model.bodies import GROUND
-from ufl_beam.model.functions import TimeFunction, value_at
+from ufl_beam.model.functions import TimeFunction, still, value_at
 from ufl_beam.model.supports import Support
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks
@@ -34,8 +36,11 @@ class Supports:
             axes of the supports.
         entries: Matrix entries in the rows and columns of ``dofs``; diagonal entries of ``dofs``.
         pivots: Values of the diagonal entries of ``dofs`` in the constrained matrix.
-        turned, axes: Number of supports with rotated axes; their ``turned_axes`` of loops.h.
+        turned, axes: Number of rotations of axes; their ``turned_axes`` of loops.h.
         motions: Each moving local degree of freedom, its function of time, and its support.
+        hinges: Each support in space with an axis, and the rotations of its node, (3,), of which
+            the last one is about the axis.  Those with a prescribed rotation are first.
+        angles: Rotations of the hinges; rad.
         moving: Local degrees of freedom whose values depend on time.
         work: True if any support of the scene, on any process, moves.
     """
@@ -46,15 +51,29 @@ class Supports:
         self.motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in subdomain.numbering.scene.rigid_bodies:
             constrained.extend(subdomain.local(subdomain.numbering.node(GROUND.middle)))
+        self._fixed = list[int]()
+        free, driven = list[tuple[Support, Index]](), list[tuple[Support, Index]]()
+        of_hinges = list[tuple[int, TimeFunction, Support]]()
         for support in subdomain.numbering.scene.supports:
             dofs = subdomain.numbering.node(support.place)
-            if support.angle and len(subdomain.local(dofs[:2])):
-                turned.append(_turned_axes(subdomain.local(dofs[:2]), support.angle, A))
+            for i, j, angle in support.turns:
+                if len(pair := subdomain.local(dofs[[i, j]])):
+                    turned.append(_turned_axes(pair, angle, A))
             for component, motion in support.held.items():
-                local_dofs = subdomain.local(dofs[[*subdomain.numbering.components(component)]])
+                local_dofs = subdomain.local(dofs[[component]])
                 constrained.extend(local_dofs)
+                if support.displacements == 3 > component and support.turns and motion == still:
+                    self._fixed.extend(local_dofs)
                 if component in support.moving:
-                    self.motions.extend((dof, motion, support) for dof in local_dofs)
+                    group = (
+                        of_hinges if support.axis is not None and component == 5 else self.motions
+                    )
+                    group.extend((dof, motion, support) for dof in local_dofs)
+            if support.axis is not None:
+                own = support, subdomain.local(dofs[3:])
+                (driven if 5 in support.moving else free).append(own)
+        self.motions += of_hinges
+        self.hinges, self._driven = [*driven, *free], len(driven)
         self.turned, self.axes, self._alive = len(turned), ffi.new("turned_axes[]", turned), turned
         self.dofs = np.array(sorted(constrained), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self.motions], dtype=np.int64)
@@ -67,6 +86,7 @@ class Supports:
         self.work = any(support.moving for support in subdomain.numbering.scene.supports)
         if self.work:
             ledger.supplied["supports"] += 0.0
+        self.angles: Array = np.zeros(len(self.hinges))
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions.copy()
 
@@ -100,11 +120,19 @@ class Supports:
         """Return ``moving_supports`` of loops.h: prescribed motions, and the work of reactions."""
         moves = [(motion, support) for _, motion, support in self.motions]
         entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
+        held = {int(dof): i for i, dof in enumerate(self.dofs)}
+        hinges = [
+            (int(dofs[2]), [held[int(dof)] for dof in dofs[:2]], held.get(int(dofs[2]), -1))
+            for _, dofs in self.hinges
+        ]
         return struct(
             "moving_supports", held=len(self.dofs), hold=self.dofs.astype(np.int32),
             moving=len(moves), dof=self.moving.astype(np.int32),
             motion=callbacks.time_functions(moves), reactions=self.reactions,
             before=self._before, work=entry, weight_of_before=self._scheme.weight_of_before,
+            fixed=len(self._fixed), fix=np.array(self._fixed, dtype=np.int32),
+            hinges=len(hinges), driven=self._driven, at_end=acts_at_end(self._scheme),
+            hinge=ffi.new("hinge_support[]", hinges), angle=self.angles,
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
@@ -130,11 +158,40 @@ class Supports:
         self.reactions[:] = self._before
 
     def carry_on(self, archive: Archive, q: Array) -> None:
-        """Save or restore the reactions in the equation of the last step."""
+        """Save or restore the reactions in the equation of the last step, and angles of hinges."""
         reactions: Array = np.zeros(len(q))
         reactions[self.dofs] = self._before
         self.reactions[:] = archive.at_dofs("reactions", reactions)[self.dofs]
         self.commit()
+        about = [int(dofs[2]) for _, dofs in self.hinges]
+        if about and (not archive.restores or archive.has("angles of hinges")):
+            angles: Array = np.zeros(len(q))
+            angles[about] = self.angles
+            self.angles[:] = archive.at_dofs("angles of hinges", angles)[about]
+
+    @property
+    def angle_of(self) -> dict[Support, float]:
+        """Angles of the hinges; rad."""
+        return dict(zip((support for support, _ in self.hinges), self.angles, strict=True))
+
+    def find_angles(self, turns: Callable[[Support], Array], t: float) -> None:
+        """Set the angles of hinges from rotation vectors of their places, ``turns``.
+
+        Whole turns are those of the prescribed rotation at the time ``t``.
+
+        Raises:
+            ModelError: The place of a hinge has turned about another axis.
+        """
+        for k, (support, _) in enumerate(self.hinges):
+            turn, axis = turns(support), np.array(support.axis) / np.linalg.norm(support.axis)
+            angle = float(turn @ axis)
+            whole = value_at(support.moving[5], t, support) - angle if k < self._driven else 0.0
+            self.angles[k] = angle + 2 * math.pi * round(whole / (2 * math.pi))
+            if np.abs(turn - angle * axis).max() > 1e-9:
+                raise ModelError(
+                    f"start: {support} turns about {support.axis}, but its place has turned about "
+                    "another axis; use Revolute and the ground, or another axis"
+                )
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the reactions and the pivots."""

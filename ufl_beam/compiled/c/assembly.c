@@ -74,7 +74,7 @@ static cells some_cells(const cells *c, int first)
 void turn_axes(int number, const turned_axes *axes, double *x, int way)
 {
   for (int k = 0; k < number; ++k) {
-    const turned_axes *t = axes + k;
+    const turned_axes *t = axes + (way > 0 ? k : number - 1 - k);
     const double a = x[t->i], b = x[t->j], s = way * t->s;
     x[t->i] = t->c * a + s * b, x[t->j] = t->c * b - s * a;
   }

@@ -384,8 +384,8 @@ typedef double (miss)(void *self, const double *q, const double *r, double scale
 typedef struct { miss *missed; void *self; } law_residual;
 miss missed_by_points, missed_by_block;
 
-/* A point whose displacement is in the axes of a support at an angle; c and s are its cosine and
- * sine. The arrays list the entries of the tangent in the rows and in the columns of both degrees
+/* A rotation of two components of a motion into the axes of a support; c and s are its cosine and
+ * sine. In space there may be several, one after another. The arrays list the entries of the tangent in the rows and in the columns of both degrees
  * of freedom. */
 typedef struct {
   int i, j, in_rows, in_columns;
@@ -719,14 +719,24 @@ typedef struct {
   double *kept, *lost; /* entries of the ledger, energy stored and dissipated; or none */
 } matrix_of_rates;
 
+/* A node in space that turns about an axis of a support: the degree of freedom of this rotation, and
+ * positions in `reactions` of the moments across the axis, and about it or -1. */
+typedef struct { int32_t axis, across[2], about; } hinge_support;
+
 /* Prescribed motions of supports, and their work. */
 typedef struct {
   int held, moving;
   const int32_t *hold, *dof; /* degrees of freedom that are held; those that move */
   const time_function *motion;
-  const double *reactions;
+  double *reactions;
   double *before, *work; /* work: entry of the ledger */
   double weight_of_before;
+  /* driven: hinges with prescribed rotations, the last motions; at_end: whether the equation of a step
+   * holds at its end */
+  int hinges, driven, at_end, fixed;
+  const int32_t *fix;         /* fixed displacements in space in turned axes */
+  const hinge_support *hinge; /* the driven ones are first */
+  double *angle;              /* of each hinge; rad */
 } moving_supports;
 
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */

@@ -118,9 +118,12 @@ static int begin_terms(time_loop *m)
   return raised_anywhere(m->equation) == NOTHING;
 }
 
+/* Largest prescribed rotation in a step in space, where a rotation about an axis is 2 tan(angle / 2). */
+static const double LARGEST_TURN = 2.356;
+
 /* Initial guess of the end of the step in the axes of supports: extrapolation of the last steps,
- * and the prescribed motions of supports. */
-static void guess(time_loop *m)
+ * and the prescribed motions of supports. Returns 0 if a support turns too far. */
+static int guess(time_loop *m)
 {
   const moving_supports *p = m->supports;
   const equation *e = m->equation;
@@ -128,15 +131,27 @@ static void guess(time_loop *m)
   if (m->prediction->known >= POINTS_OF_GUESS) predict_stage(m->prediction, m->step.t1, m->guess);
   else predict(m->prediction, m->step.dt, q, m->guess);
   turn_axes(e->turned, e->axes, m->guess, 1);
-  if (p->moving && e->turned) {
+  for (int k = 0; k < p->fixed; ++k) m->guess[p->fix[k]] = 0;
+  if ((p->moving || p->hinges) && e->turned) {
     memcpy(e->plane, q, m->size * sizeof *q);
     turn_axes(e->turned, e->axes, e->plane, 1);
     q = e->plane;
   }
+  const double *angle = p->angle;
+  double turn = 0;
   for (int k = 0; k < p->moving; ++k) {
-    const int i = p->dof[k];
-    m->guess[i] = q[i] + m->step.fraction * (value_at(p->motion + k, m->step.motion_time) - q[i]);
+    const int i = p->dof[k], turns = k >= p->moving - p->driven;
+    const double from = turns ? *angle++ : q[i];
+    double change = m->step.fraction * (value_at(p->motion + k, m->step.motion_time) - from);
+    if (turns) turn = fmax(turn, fabs(change)), change = 2 * tan(change / 2);
+    m->guess[i] = q[i] + change;
   }
+  for (int k = 0; k < p->hinges; ++k)
+    for (int j = 0; j < 2; ++j) {
+      const int i = p->hold[p->hinge[k].across[j]];
+      m->guess[i] = q[i];
+    }
+  return turn <= LARGEST_TURN;
 }
 
 /* -- places that open: see material_points.py ------------------------------------------------------------ */
@@ -376,10 +391,27 @@ static int solve_to(time_loop *m, double t1, double end)
 {
   if (set_step(m, t1, end)) {
     run(&m->begin, &m->step, 0, 0);
-    guess(m);
-    if (raised_anywhere(m->equation) == NOTHING) return solve_step(m, 1);
+    const int turns = guess(m);
+    if (raised_anywhere(m->equation) == NOTHING) return turns ? solve_step(m, 1) : fails(m, TURNS_TOO_FAR);
   }
   return fails(m, RAISED);
+}
+
+/* Moments of hinges in axes of the node at the end of the step; the unknowns are in axes at its begin,
+ * and in statics their changes are not rotations. */
+static void turn_moments(const moving_supports *p, double *s)
+{
+  for (int k = 0; k < p->hinges; ++k) {
+    const hinge_support *h = p->hinge + k;
+    const double x = s[h->axis] / 2, c = p->at_end ? 1 : (1 - x * x) / (1 + x * x);
+    const double y = p->at_end ? x : 2 * x / (1 + x * x), M = p->reactions[h->across[0]];
+    double *N = p->reactions + h->across[1];
+    p->reactions[h->across[0]] = c * M + y * *N, *N = c * *N - y * M;
+    p->angle[k] += 2 * atan(x);
+    if (!p->at_end) continue;
+    s[h->axis] = 2 * atan(x);
+    if (h->about >= 0) p->reactions[h->about] *= 1 + x * x;
+  }
 }
 
 static void accept_supports(time_loop *m)
@@ -387,6 +419,7 @@ static void accept_supports(time_loop *m)
   const moving_supports *p = m->supports;
   const double a = p->weight_of_before;
   turn_axes(m->equation->turned, m->equation->axes, m->s, 1);
+  turn_moments(p, m->s);
   if (p->moving)
     for (int k = 0; k < p->held; ++k)
       if (p->hold[k] < m->equation->owned)

@@ -1,0 +1,520 @@
+# SPDX-License-Identifier: MIT
+"""Supports and loads in space: equality with the plane, closed forms, balances, restart, errors."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import ufl_beam as ub
+
+EXACT = ub.Newton(rtol=1e-13)
+STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
+OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
+TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
+SECTION = ub.Section(**STIFF, **OTHER)
+
+
+def flat(x, y):
+    return (x, y)
+
+
+def skew(x, y):
+    return tuple(TURN.apply([x, y, 0.0]))
+
+
+def normal(at, size=1.0):
+    """A vector across the plane of a scene in space, or the number of the plane."""
+    return size if at is flat else tuple(TURN.apply([0.0, 0.0, size]))
+
+
+def driven(at, more):
+    """A frame whose foot moves and turns as functions of time, on a roller at an angle."""
+    up = {} if at is flat else {"up": normal(at)}
+    turning = {} if at is flat else {"axis": normal(at), "w": 0.0}
+    section = ub.Section(**STIFF) if at is flat else SECTION
+    sides = [{}, {}] if at is flat else [{"up": at(-3, 4)}, {"up": at(0, 1)}]
+    post = ub.Beam(at(0, 0), at(4, 3), section, cells=4, **sides[0])
+    girder = ub.Beam(at(4, 3), at(7, 3), section, cells=3, **sides[1])
+    foot = ub.PrescribedDisplacement(
+        post.start, u=lambda t: 0.3 * np.sin(2 * t), v=lambda t: 0.1 * t, psi=lambda t: 1.5 * t * t,
+        along=at(3, 4), **up, **turning,
+    )  # fmt: skip
+    return ub.Scene(
+        [post, girder], joints=[ub.Rigid(post.end, girder.start)],
+        supports=[foot, ub.Roller(girder.end, along=at(2, 1)), *more(post, girder, at)[0]],
+        loads=[ub.Gravity(at(0.5, -1)), *more(post, girder, at)[1]],
+    )  # fmt: skip
+
+
+def both(make, scheme, places, t=1.0, dt=0.1):
+    """Run a scene in the plane and in a skew plane in space, compare them, and return the runs."""
+    runs = [
+        ub.simulate(make(at), scheme, t=(0, t), dt=dt, newton=EXACT, progress=False)
+        for at in (flat, skew)
+    ]
+    size, back = runs[0].scene.size, TURN.inv()
+    for place in places:
+        plane, space = (run.displacement(place(run.scene)) for run in runs)
+        u, rotation = back.apply(space[:, :3]), back.apply(space[:, 3:])
+        assert np.abs(u[:, :2] - plane[:, :2]).max() < 1e-12 * size
+        assert np.abs(u[:, 2]).max() < 1e-12 * size
+        wrapped = Rotation.from_rotvec(plane[:, 2:] * [[0.0, 0.0, 1.0]]).as_rotvec()
+        assert np.abs(rotation - wrapped).max() < 1e-11
+    for one, other in zip(*(run.scene.supports for run in runs), strict=True):
+        plane, space = runs[0].reaction(one)[1:], runs[1].reaction(other)[1:]
+        largest = np.abs(plane).max()
+        force, moment = back.apply(space[:, :3]), back.apply(space[:, 3:])
+        assert np.abs(force[:, :2] - plane[:, :2]).max() < 1e-11 * largest
+        assert np.abs(moment[:, 2] - plane[:, 2]).max() < 1e-11 * largest
+        assert max(np.abs(force[:, 2]).max(), np.abs(moment[:, :2]).max()) < 1e-11 * largest
+    for name, plane in runs[0].energy.supplied.items():
+        space = runs[1].energy.supplied[name]
+        assert np.abs(space - plane).max() < 1e-11 * max(1.0, np.abs(plane).max())
+    return runs
+
+
+SCHEMES = [
+    ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.Static(),
+    ub.EnergyMomentumStatic(),
+]  # fmt: skip
+ENDS = [lambda scene: scene.beams[0].start, lambda scene: scene.beams[1].end]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_driven_frame_equals_the_plane(scheme):
+    both(lambda at: driven(at, lambda *_: ([], [])), scheme, ENDS)
+
+
+AXIS = np.array([1.0, 2.0, -1.0]) / np.sqrt(6)
+
+
+def turns(t):
+    """Three turns, which begin slowly and end."""
+    return 6 * np.pi * t * t / (t * t + 1)
+
+
+def propeller(psi=turns, arm=True):
+    """A beam whose root turns about a skew axis; with a body at its end."""
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=4)
+    ball = ub.Body((3, 1, 0.5), mass=2.0, inertia=(1, 1, 1.5))
+    more = {"bodies": [ball], "joints": [ub.Rigid(beam.end, ball.middle)]} if arm else {}
+    root = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, psi=psi, axis=tuple(AXIS))
+    return ub.Scene([beam], supports=[root], **more)
+
+
+def test_a_root_turns_three_times_about_a_skew_axis():
+    """The work is the energy, the moment changes the angular momentum, the axis stays."""
+    run = ub.simulate(propeller(), ub.EnergyMomentum(), t=(0, 4), dt=0.02, newton=EXACT,
+                      progress=False)  # fmt: skip
+    (root,), energy = run.scene.supports, run.energy
+    assert np.abs(energy.supplied["supports"] - energy.total).max() < 1e-12 * energy.total.max()
+    assert energy.total[-1] > 100.0
+    rotation = Rotation.from_rotvec(run.displacement(root.place)[:, 3:])
+    assert np.abs(rotation.apply(AXIS) - AXIS).max() < 1e-12
+    exact = Rotation.from_rotvec(turns(run.times)[:, None] * AXIS)
+    assert (rotation * exact.inv()).magnitude().max() < 1e-12
+    momentum, reaction = run.momentum(), run.reaction(root)
+    rates = np.diff(momentum, axis=0) / 0.02
+    assert np.abs(rates - reaction[1:]).max() < 1e-10 * np.abs(rates).max()
+
+
+def test_a_driven_root_equals_a_joint_with_a_motor():
+    """Within half a turn, which motors can measure."""
+    driven = propeller(arm=False)
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=4)
+    ground = ub.ground(0, 0, 0)
+    motor = ub.Turn(ground, beam.start, ub.PrescribedMotion(turns), axis=tuple(AXIS))
+    joint = ub.Revolute(ground, beam.start, axis=tuple(AXIS))
+    jointed = ub.Scene([beam], joints=[joint], connectors=[motor])
+    one, other = (
+        ub.simulate(
+            x,
+            ub.EnergyMomentum(),
+            t=(0, 0.4),
+            dt=0.02,
+            newton=ub.Newton(rtol=1e-12),
+            progress=False,
+        )
+        for x in (driven, jointed)
+    )
+    ends = [run.displacement(run.scene.beams[0].end) for run in (one, other)]
+    assert np.abs(ends[0] - ends[1]).max() < 1e-13
+    supplied = one.energy.supplied["supports"], other.energy.supplied["motors"]
+    assert np.abs(supplied[0] - supplied[1]).max() < 1e-11 * supplied[0].max()
+
+
+@pytest.mark.parametrize("psi", [None, lambda t: 4 * t], ids=["on a spring", "driven"])
+def test_moments_of_a_hinge_in_statics(psi):
+    """The moments balance the force at the tip; a hinge that is free has none about its axis."""
+    scene = propeller(psi, arm=False)
+    (beam,), (root,) = scene.beams, scene.supports
+    pull = ub.PointLoad(beam.end, force=(1, -2, 3), amplitude=lambda t: 1 + t)
+    spring = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(100.0), axis=tuple(AXIS))
+    whole = ub.Scene([beam], supports=[root], loads=[pull], connectors=[spring] * (psi is None))
+    run = ub.simulate(whole, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    force = np.array([1.0, -2.0, 3.0]) * (1 + run.times[1:, None])
+    reaction, tip = run.reaction(root)[1:], run.position(beam.end)[1:]
+    moment = reaction[:, 3:].copy()
+    if psi is None:
+        assert np.abs(moment @ AXIS).max() < 1e-9
+        assert np.linalg.norm(run.displacement(beam.start)[-1, 3:]) > 0.04
+        moment -= run.connector(spring).force[1:, None] * AXIS
+    assert np.abs(reaction[:, :3] + force).max() < 1e-9
+    assert np.abs(moment + np.cross(tip, force)).max() < 1e-8
+
+
+def test_a_point_slides_in_turned_axes():
+    """A heavy beam whose ends slide along skew lines: the lines, the ledger, and reactions."""
+    lines = np.array([[1.0, 2.0, -1.0], [2.0, -1.0, 1.0]])
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=4)
+    rollers = [
+        ub.Roller(place, along=tuple(line))
+        for place, line in zip((beam.start, beam.end), lines, strict=True)
+    ]
+    twist = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(50.0), axis=(3, 1, 0.5))
+    scene = ub.Scene(
+        [beam], supports=rollers, connectors=[twist], loads=[ub.Gravity((0.0, -1.0, -9.81))]
+    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=0.02, progress=False)
+    assert run.energy.worst < 1e-10
+    for roller, line in zip(rollers, lines, strict=True):
+        moved, force = run.displacement(roller.place)[:, :3], run.reaction(roller)[1:, :3]
+        assert np.abs(moved).max() > 0.1
+        assert np.abs(np.cross(moved, line)).max() < 1e-13
+        assert np.abs(force @ line).max() < 1e-12 * np.abs(force).max()
+
+
+def test_a_base_that_shakes_equals_an_acceleration_of_all_masses():
+    """In the frame of the base; the base is shaken along skew axes, in directions of its own."""
+    shake, accelerations = (lambda t: 0.05 * t**2), 0.1
+    along, up = np.array([1.0, 2.0, 2.0]) / 3, np.array([2.0, 1.0, -2.0]) / 3
+    beam = ub.Beam((0, 0, 0), (0, 0.5, 3), SECTION, cells=4, up=(1, 0, 0))
+    base = ub.PrescribedDisplacement(
+        beam.start, u=shake, v=0.0, w=lambda t: -2 * shake(t), along=tuple(along), up=tuple(up),
+        axis=(0, 0, 1), psi=0.0,
+    )  # fmt: skip
+    drift = ub.Velocity([beam], linear=(0, 0, 0))
+    moving = ub.Scene([beam], supports=[base], initial=[drift])
+    still = ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start)],
+        loads=[ub.Gravity(tuple(-accelerations * (along - 2 * up)))],
+    )  # fmt: skip
+    runs = [
+        ub.simulate(x, ub.EnergyMomentum(), t=(0, 1), dt=0.05, newton=EXACT, progress=False)
+        for x in (moving, still)
+    ]
+    one, other = (run.displacement(beam.end) for run in runs)
+    carried = shake(runs[0].times)[:, None] * (along - 2 * up)
+    assert np.abs(one[:, :3] - carried - other[:, :3]).max() < 1e-12
+    assert np.abs(one[:, 3:] - other[:, 3:]).max() < 1e-12
+    assert np.abs(other[:, :3]).max() > 1e-3
+    assert runs[0].energy.worst < 1e-12
+
+
+@pytest.mark.parametrize("psi", [None, turns], ids=["free", "driven"])
+def test_start_and_checkpoint_of_a_hinge(psi, shared_path):
+    """A restart changes no bit; another scene, which finds the angle of the place, only digits."""
+    scene = propeller(psi, arm=False)
+    (beam,), (root,) = scene.beams, scene.supports
+    push = ub.PointLoad(beam.end, force=(1, 4, 2), amplitude=lambda t: t < 0.3)
+    pushed = ub.Scene([beam], supports=[root], loads=[push])
+
+    def run(end, scene=pushed, begin=0.0, **more):  # times are binary numbers
+        return ub.simulate(
+            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 16, progress=False, **more
+        )
+
+    checkpoint = ub.Checkpoint(shared_path / "run.checkpoint", every=8)
+    whole, first = run(4), run(2, checkpoint=checkpoint)
+    restarted = run(4, checkpoint=checkpoint)
+    for result in (lambda x: x.displacement(beam.end), lambda x: x.reaction(root)[1:]):
+        assert (result(whole) == result(restarted)).all()
+    assert np.linalg.norm(whole.displacement(beam.start)[32, 3:]) > 0.1
+    other = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, psi=psi, axis=tuple(AXIS))
+    for parts in ({"supports": [root], "loads": [push]}, {"supports": [other]}):
+        second = run(4, ub.Scene([beam], **parts), begin=2.0, start=first)
+        apart = whole.displacement(beam.end)[32:] - second.displacement(beam.end)
+        assert np.abs(apart).max() < 1e-9
+    tilted = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=(0, 0, 1))
+    with pytest.raises(ub.ModelError, match="turned about another axis"):
+        run(4, ub.Scene([beam], supports=[tilted]), begin=2.0, start=first)
+
+
+def following(post, girder, at):
+    """A follower force with a moment, and pressures on a part of a beam and on another beam."""
+    thrust = ub.FollowerLoad(
+        girder.end, force=at(3, 8), moment=normal(at, -20.0), amplitude=lambda t: 1 + t
+    )
+    wind, side = (15.0, 9.0) if at is flat else ((15.0, 0.0), (9.0, 0.0))
+    blow = ub.Pressure(post, normal=wind, tangential=-4.0, span=(0.25, 1.0), profile=(0.5, 2.0))
+    return [], [thrust, blow, ub.Pressure(girder, normal=side, amplitude=lambda t: t)]
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_loads_that_follow_equal_the_plane(scheme):
+    both(lambda at: driven(at, following), scheme, ENDS)
+
+
+def with_load_at_arm(at):
+    """A beam with a ball, which a force and a moment at its edge swing."""
+    other = {"GA": 7e3, "GA3": 1e4, "EI": 300.0, "EI2": 500.0, "rhoI": 6.0, "rhoI2": 10.0}
+    section = ub.Section(**STIFF) if at is flat else ub.Section(**STIFF | OTHER | other)
+    up = {} if at is flat else {"up": normal(at)}
+    beam = ub.Beam(at(0, 0), at(2, 0), section, cells=4, **up)
+    ball = ub.Body(at(2.5, 0.3), mass=3.0, inertia=0.7 if at is flat else (0.7, 0.7, 0.7))
+    push = ub.PointLoad(ball.at(*at(3, 1)), force=at(20, 90))
+    # A moment of a body does not depend on its place; in the plane there it has another scheme
+    place = ball.middle if at is flat else ball.at(*at(3, 1))
+    twist = ub.PointLoad(place, moment=normal(at, 30.0))
+    wind = ub.Pressure(beam, normal=-25.0 if at is flat else (0.0, 25.0))  # axis 3 is the right
+    return ub.Scene(
+        [beam], bodies=[ball], joints=[ub.Rigid(beam.end, ball.at(*at(2, 0)))],
+        supports=[ub.Clamped(beam.start)], loads=[push, twist, wind],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
+def test_a_load_at_an_arm_equals_the_plane(scheme):
+    both(with_load_at_arm, scheme, [lambda scene: scene.bodies[0].middle])
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_a_moving_force_equals_the_plane(scheme):
+    """It crosses the joint of two beams, and leaves the second one."""
+
+    def moves(post, girder, at):
+        return [], [ub.MovingLoad([post, girder], lambda t: 9 * t, force=at(5, -20))]
+
+    both(lambda at: driven(at, moves), scheme, ENDS)
+
+
+@pytest.mark.parametrize("kind", [ub.PointLoad, ub.FollowerLoad])
+def test_work_of_a_moment_in_statics(kind):
+    """In bending about one axis, work and energy are linear in angles, and equal to digits.
+
+    Also after a continued run, whose first step begins with the last moment.
+    """
+    beam = ub.Beam(skew(0, 0), skew(3, 1), SECTION, cells=8, up=skew(-1, 3))
+    bend = kind(beam.end, moment=normal(skew, 300.0), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[bend])
+    first = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    assert first.energy.worst < 1e-14
+    second = ub.simulate(scene, ub.Static(), t=(1, 2), dt=0.25, start=first, progress=False)
+    assert second.energy.worst < 1e-14
+    angle = np.linalg.norm(first.displacement(beam.end)[-1, 3:])
+    exact = 300.0 * np.hypot(3, 1) / STIFF["EI"]
+    assert abs(angle - exact) < 1e-9
+    assert abs(first.energy.supplied["loads"][-1] - 300.0 * exact / 2) < 1e-9
+
+
+def test_a_spinning_body_with_a_follower_force():
+    """The force turns with the body, by the same angle in each step: sums of its directions."""
+    force, spin, dt = np.array([3.0, -1.0, 2.0]), np.array([1.0, -2.0, 2.0]), 0.05
+    ball = ub.Body((1, 2, 3), mass=2.0, inertia=(4, 4, 4))
+    scene = ub.Scene(
+        bodies=[ball], loads=[ub.FollowerLoad(ball.middle, force=tuple(force))],
+        initial=[ub.Velocity([ball], angular=tuple(spin), about=(1, 2, 3), linear=(0, 0, 0))],
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=dt, newton=EXACT, progress=False)
+    steps = 2 * np.arctan(np.linalg.norm(spin) * dt / 2) * (np.arange(40) + 0.5)
+    directions = Rotation.from_rotvec(steps[:, None] * spin / np.linalg.norm(spin))
+    momentum = np.cumsum(dt * directions.apply(force), axis=0)
+    assert np.abs(run.momentum()[1:, :3] - momentum).max() < 1e-12
+    assert run.energy.worst < 1e-13
+
+
+def test_a_load_that_is_added_follows_the_rotation():
+    """In a run with start=, a new load begins with the rotation of its place in the earlier run."""
+    beam = ub.Beam((0, 0, 0), (3, 1, 0.5), SECTION, cells=3)
+    spin = ub.Velocity([beam], angular=(1, 2, -1), linear=(0, 0, 0), about=(0, 0, 0))
+
+    def run(begin, end, amplitude, start=None):
+        loads = [
+            ub.FollowerLoad(beam.end, force=(1, 5, -2), moment=(3, 0, 9), amplitude=amplitude),
+            ub.Pressure(beam, normal=(4, -3), amplitude=amplitude),
+        ]
+        scene = ub.Scene([beam], loads=loads, initial=[spin])
+        return ub.simulate(
+            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, start=start, progress=False
+        ).displacement(beam.end)[-1]
+
+    whole = run(0, 2, lambda t: t > 1)
+    scene = ub.Scene([beam], initial=[spin])
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / 32, progress=False)
+    assert np.linalg.norm(first.displacement(beam.end)[-1, 3:]) > 1
+    second = run(1, 2, lambda t: 1.0, first)
+    assert np.abs(second - whole).max() < 1e-9
+
+
+def machine():
+    """A driven beam with a spinning wheel, follower loads, and pressures in both directions."""
+    root = ub.Beam((0, 0, 0), (0, 0, 2), SECTION, cells=3, up=(1, 0, 0))
+    arm = ub.Beam((0, 0, 2), (2, 0.5, 2), SECTION, cells=3)
+    wheel = ub.Body((2, 0.5, 2), mass=3.0, inertia=(0.4, 0.7, 0.4))
+    foot = ub.PrescribedDisplacement(
+        root.start, u=lambda t: 0.1 * np.sin(3 * t), v=0.0, w=0.0, along=(1, 2, 2),
+        axis=(1, 0, 3), psi=lambda t: 2 * t * t,
+    )  # fmt: skip
+    loads = [
+        ub.FollowerLoad(arm.end, force=(3, 8, -2), moment=(1, 5, 2), amplitude=lambda t: 1 + t),
+        ub.Pressure(root, normal=(8.0, -5.0), tangential=3.0, profile=(0.2, 1.5)),
+        ub.Pressure(arm, normal=(-2.0, 9.0), span=(0.5, 1.0), amplitude=np.sin),
+        ub.PointLoad(wheel.at(2.5, 0.5, 2), force=(5, 0, 9), moment=(0, 2, 0)),
+        ub.Gravity((0, 0, -9.81)),
+    ]
+    return ub.Scene(
+        [root, arm], bodies=[wheel], supports=[foot], loads=loads,
+        joints=[
+            ub.Rigid(root.end, arm.start), ub.Revolute(arm.end, wheel.middle, axis=(0, 1, 0)),
+        ],
+        initial=[ub.Velocity([wheel], angular=(0, 9, 0), linear=(0, 0, 0), about=(2, 0.5, 2))],
+    )  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:Velocity")
+def test_a_machine_balances_and_restarts(shared_path):
+    """The ledger closes; a restart from a checkpoint changes no bit, and start= only digits."""
+
+    def run(end, begin=0.0, **more):
+        return ub.simulate(
+            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, progress=False, **more
+        )
+
+    scene, checkpoint = machine(), ub.Checkpoint(shared_path / "run.checkpoint", every=8)
+    wheel = scene.bodies[0].middle
+    whole, first = run(2), run(1, checkpoint=checkpoint)
+    assert whole.energy.worst < 1e-11
+    assert (run(2, checkpoint=checkpoint).displacement(wheel) == whole.displacement(wheel)).all()
+    second = run(2, 1.0, start=first)
+    assert np.abs(second.displacement(wheel) - whole.displacement(wheel)[32:]).max() < 1e-10
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_a_rotating_frame_equals_the_plane(scheme):
+    def make(at):
+        part = with_load_at_arm(at)
+        frame = ub.RotatingFrame(normal(at, 2.5), about=at(-1, 0.5))
+        return ub.Scene(
+            part.beams, bodies=part.bodies, joints=part.joints, supports=part.supports,
+            loads=[*part.loads[:1], frame],
+        )  # fmt: skip
+
+    both(make, scheme, [lambda scene: scene.bodies[0].middle])
+
+
+def test_a_flight_seen_from_a_rotating_frame():
+    """A bent beam with a spinning wheel, in a frame that turns: the errors are of second order.
+
+    The flight in the frame at rest is turned back; its steps are short.
+    """
+    rate, about = np.array([0.4, -0.8, 0.6]), np.array([0.5, 1.0, -0.3])
+
+    def flight(turning):
+        beam = ub.Beam((0, 0, 0), (2, 1, 0.5), SECTION, cells=2)
+        wheel = ub.Body((2, 1, 0.5), mass=3.0, inertia=(2.0, 3.0, 1.5))
+        joint = ub.Rigid(beam.end, wheel.middle)
+        spin, linear = np.array([0.5, 0.2, -1.0]), np.array([0.3, 0.0, 0.1])
+        if turning:  # velocities of the same motion in the frame
+            spin, linear = spin - rate, linear + np.cross(rate, about)
+        start = ub.Velocity(
+            [beam, wheel], linear=tuple(linear), angular=tuple(spin), about=(0, 0, 0)
+        )
+        frames = [ub.RotatingFrame(tuple(rate), about=tuple(about))] * turning
+        return ub.Scene([beam], bodies=[wheel], joints=[joint], initial=[start], loads=frames)
+
+    def states(turning, dt):
+        run = ub.simulate(
+            flight(turning), ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT, progress=False
+        )
+        assert run.energy.worst < 1e-12
+        wheel = run.scene.bodies[0].middle
+        return run.position(wheel)[-1], Rotation.from_rotvec(run.displacement(wheel)[-1, 3:])
+
+    place, rotation = states(False, 1 / 320)
+    back, errors = Rotation.from_rotvec(-rate), []
+    for dt in (0.1, 0.05):
+        at, turned = states(True, dt)
+        apart = (turned * (back * rotation).inv()).magnitude()
+        errors.append((np.linalg.norm(at - about - back.apply(place - about)), apart))
+    assert (np.abs(np.log2(np.divide(*errors)) - 2) < 0.2).all()
+    assert np.max(errors[1]) < 1e-2
+
+
+def test_whirling_of_a_shaft():
+    """Both frequencies of a Rayleigh shaft on bearings, in the frame that turns with it.
+
+    (ρA + I k²) ω² - J Ω k² ω - E I k⁴ = 0 with k = π/L, about the frame at rest.  The scheme maps
+    a frequency ω to 2/dt arctan(ω dt/2).  Errors are of second order in the length of the cells.
+    """
+    L, E, Ω, k, dt = 10.0, 400.0, 12.0, np.pi / 10.0, 0.02
+    exact = np.roots([1 + 0.3 * k**2, -0.6 * Ω * k**2, -E * k**4])
+    assert np.abs(np.sort(exact) - [-1.630614, 2.320791]).max() < 1e-6
+    section = ub.Section(
+        EA=1e7, GA=1e7, GA3=1e7, EI=E, EI2=E, GJ=300.0, rhoA=1.0, rhoI=0.3, rhoI2=0.3
+    )
+
+    def frequencies(cells):
+        shaft = ub.Beam((0, 0, 0), (L, 0, 0), section, cells=cells)
+        bearings = [ub.Pinned(shaft.start), ub.Roller(shaft.end, along=(1, 0, 0))]
+        push = ub.LineLoad(shaft, force=(0, 1e-6, 0), amplitude=lambda t: t < 0.5,
+                           profile=lambda s: np.sin(np.pi * s))  # fmt: skip
+        frame = ub.RotatingFrame((Ω, 0, 0))
+        scene = ub.Scene([shaft], supports=bearings, loads=[push, frame])
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 30), dt=dt, progress=False)
+        y = run.displacement(shaft.at(0.5))[int(1 / dt) :, 1:3] @ [1.0, 1.0j]
+        # The sum of two exponentials: y[n + 1] is a combination of y[n] and y[n - 1]
+        (a, b), *_ = np.linalg.lstsq(np.column_stack([y[1:-1], y[:-2]]), y[2:], rcond=None)
+        steps = np.angle(np.roots([1.0, -a, -b]))
+        return np.sort(2 / dt * np.tan(steps / 2) + Ω)
+
+    coarse, fine = frequencies(16), frequencies(32)
+    assert (np.abs(np.log2((coarse - np.sort(exact)) / (fine - np.sort(exact))) - 2) < 0.1).all()
+    assert np.abs((4 * fine - coarse) / 3 - np.sort(exact)).max() < 1e-4
+
+
+BEAM = ub.Beam((0, 0, 0), (1, 0, 0), SECTION, name="arm")
+PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
+MOVED = ub.PrescribedDisplacement
+WRONG = {
+    "roller of the plane": (lambda: ub.Roller(BEAM.end, along=(1, 1)), "must have 3 components"),
+    "roller of space": (lambda: ub.Roller(PLANAR.end, along=(1, 1, 0)), "must have 2 components"),
+    "rotation without axis": (lambda: MOVED(BEAM.end, psi=0.1), "give the axis=(x, y, z)"),
+    "axis in the plane": (lambda: MOVED(PLANAR.end, axis=(0, 0, 1)), "axis is for scenes in space"),
+    "third displacement in the plane": (lambda: MOVED(PLANAR.end, w=0), "w is for scenes in space"),
+    "axis of length zero": (lambda: MOVED(BEAM.end, axis=(0, 0, 0)), "is no direction"),
+    "up along u": (
+        lambda: MOVED(BEAM.end, u=0, along=(0, 0, 2)), "up is along the direction of u",
+    ),
+    "nothing": (lambda: MOVED(BEAM.end), "at least one of u, v, w, axis"),
+    "two supports": (
+        lambda: ub.Scene([BEAM], supports=[ub.Pinned(BEAM.end), MOVED(BEAM.end, w=0)]),
+        "both hold w",
+    ),
+    "clamp and axis": (
+        lambda: ub.Scene([BEAM], supports=[ub.Clamped(BEAM.end), MOVED(BEAM.end, axis=(0, 1, 0))]),
+        "both hold rotation across the axis",
+    ),
+    "one pressure": (lambda: ub.Scene([BEAM], loads=[ub.Pressure(BEAM, normal=1.0)]), "2 comp"),
+    "two pressures": (
+        lambda: ub.Scene([PLANAR], loads=[ub.Pressure(PLANAR, normal=(1.0, 2.0))]), "1 comp",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_errors_before_a_run(case):
+    make, words = WRONG[case]
+    with pytest.raises(ub.ModelError, match=re.escape(words)):
+        make()
+
+
+def test_a_turn_of_more_than_135_degrees_is_divided():
+    """Also the sign of the rotation is kept, which a step of 270 degrees would not tell."""
+    run = ub.simulate(
+        propeller(lambda t: 6 * t, arm=False), ub.Static(), t=(0, 1), dt=1.0, progress=False
+    )
+    turned = Rotation.from_rotvec(run.displacement(run.scene.supports[0].place)[-1, 3:])
+    assert (turned * Rotation.from_rotvec(-6 * AXIS)).magnitude() < 1e-12
+    assert np.abs(run.strains(run.scene.beams[0])).max() < 1e-12

@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: MIT
+"""Statements of loads in space that depend on rotations: moments, follower loads, pressures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.cells import StatementOnCell
+from ufl_beam.blocks.moving_loads import moving_loads
+from ufl_beam.blocks.nodes_in_space import (
+    FIRST,
+    StatementInSpace,
+    change,
+    matrix_of,
+    new_state,
+    quaternion,
+    unknowns,
+    vector,
+)
+from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.mechanics.spatial_kinematics import (
+    Middle,
+    Turn,
+    add,
+    between,
+    cross,
+    matrix,
+    scale,
+    subtract,
+    times,
+    transposed_times,
+)
+from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
+from ufl_beam.model.functions import steady
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    LoadAtPlace,
+    MovingLoad,
+    PointLoad,
+    Pressure,
+    RotatingFrame,
+)
+from ufl_beam.quadrature import gauss_rule
+from ufl_beam.terms.dead_loads import loaded_cells
+
+NO_FORCE = [ufl.as_ufl(0.0)] * 3
+RATE = "rate x", "rate y", "rate z"
+
+
+@dataclass(frozen=True)
+class LoadOnNode(StatementInSpace):
+    """Force and moment at a node.
+
+    They turn with the node, or the moment has a constant direction and is not conservative; dead
+    forces are no statement.
+
+    Attributes:
+        follows: Whether they turn with the node.
+    """
+
+    follows: bool
+    nodes = 1
+    of_step = ("factor",)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Moment, and force of a load that follows, in the undeformed scene."""
+        return [f"{x}{i}" for x in "MF"[: 1 + self.follows] for i in range(3)]
+
+    @property
+    def state(self) -> list[str]:
+        """Quaternion; if the equation holds at the end of a step, the loads at the last end."""
+        before = [f"last {x}" for x in self.numbers] if acts_at_end(self.scheme) else []
+        return [*before, *super().state]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; the work in statics is of the mean load on the rotation vector."""
+        turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
+        M, *F = (
+            scale(at["factor"], tuple(at[f"{x}{i}"] for i in range(3)))
+            for x in "MF"[: 1 + self.follows]
+        )
+        forces: Sequence[Any] = NO_FORCE
+        if self.follows:
+            frame = matrix(between(at.stage, turn.q0, turn.q1, self.scheme.load_weight))
+            M, F = times(frame, M), [times(frame, F[0])]
+            forces = scale(-1.0, F[0])
+        on_node = turn.on_node(M, at_end=acts_at_end(self.scheme))
+        made = Equations([*forces, *scale(-1.0, on_node)], new_state([turn]))
+        if not acts_at_end(self.scheme):
+            return made
+        turned = times(turn.frame, Middle(at.stage, turn.q0, turn.q1).rotation_vector)
+        moved, loads = (*turned, *change(at, "xyz", 0)), (M, *F)
+        now = dict(zip(self.state, (x for load in loads for x in load), strict=False))
+        pairs = zip(now.items(), moved, strict=False)
+        work = sum(0.5 * (at[name] + x) * way for (name, x), way in pairs)
+        return made._replace(state=now | {**made.state}, supplied={"loads": work})
+
+
+@dataclass(frozen=True)
+class PressureInSpace(StatementInSpace):
+    """Forces along a cell, normal and tangential to the deformed axis, per deformed length."""
+
+    nodes = 2
+    of_step = ("factor",)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Forces along the axes of the section for a factor of 1, length, axes, and shares."""
+        axes = [f"R{i}{j}" for i in range(3) for j in range(3)]
+        return ["p1", "p2", "p3", "h", *axes, *(f"share{g}" for g in range(4))]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; the derivative of the axis has the length of its part of the cell."""
+        w, axes = self.scheme.load_weight, matrix_of(at, "R")
+        turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
+        u = [add(vector(at, "q0", "xyz", k), scale(w, change(at, "xyz", k))) for k in (0, 1)]
+        first, last = (between(at.stage, turn.q0, turn.q1, w) for turn in turns)
+        frame = matrix(between(at.stage, first, last))
+        second, third = (times(frame, axes[i]) for i in (1, 2))
+        along = add(scale(at["h"], transposed_times(axes, FIRST)), subtract(u[1], u[0]))
+        directions = along, cross(third, along), cross(along, second)
+        p1, p2, p3 = (scale(at[f"p{i + 1}"], x) for i, x in enumerate(directions))
+        force = tuple(map(at.stage, scale(at["factor"], add(add(p1, p2), p3))))
+        points = [*zip(*gauss_rule(4), strict=True)]
+        of_node = [
+            sum(float(x * (1 - s, s)[k]) * at[f"share{g}"] for g, (s, x) in enumerate(points))
+            for k in (0, 1)
+        ]
+        forces = [-of_node[k] * x for x in force for k in (0, 1)]
+        return Equations([*forces, *NO_FORCE, *NO_FORCE], new_state(turns))
+
+
+@dataclass(frozen=True)
+class ForceOfRotatingFrame(StatementOnCell):
+    """Centrifugal and Coriolis force on the mass of a cell, or of a node (degree 0).
+
+    Attributes:
+        scheme: Time scheme.
+    """
+
+    scheme: Scheme
+    of_step = "growth", "dt"  # growth: part of the centrifugal force, from 0 to 1 in substeps
+
+    @property
+    def unknowns(self) -> list[str]:
+        """Displacements of all nodes, component by component."""
+        return unknowns(self.nodes)[: 3 * self.nodes]
+
+    @property
+    def numbers(self) -> list[str]:
+        """Mass (kg), angular velocity of the frame (rad/s), positions from its centre (m)."""
+        return ["mass", *RATE, *(f"{c}{k}" for k in range(self.nodes) for c in "XYZ")]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; velocities are means over the step."""
+        rate, on_nodes = tuple(at[x] for x in RATE), list[Any]()
+        for k in range(self.nodes):
+            moved = change(at, "xyz", k)
+            place = add(vector(at, "q0", "xyz", k), scale(self.scheme.load_weight, moved))
+            place = add(tuple(at[f"{c}{k}"] for c in "XYZ"), place)
+            force = scale(at["growth"], cross(rate, cross(rate, place)))
+            if has_inertia(self.scheme):
+                force = add(force, scale(2 / at["dt"], cross(rate, moved)))
+            on_nodes.append(tuple(map(at.stage, scale(at["mass"], force))))
+        if self.nodes == 2:  # as the consistent matrix of inertia
+            a, b = on_nodes
+            on_nodes = [scale(1 / 6, add(scale(2.0, x), y)) for x, y in ((a, b), (b, a))]
+        return Equations([x for some in zip(*on_nodes, strict=True) for x in some])
+
+
+@dataclass(frozen=True)
+class MomentOfRotatingFrame(StatementInSpace):
+    """Centrifugal and gyroscopic moment on the rotary inertia of a node in a rotating frame.
+
+    With the inertia J and the angular velocities ω of the node and b of the frame, in axes of the
+    node, the energy -b·J b is stored, and the moment ω × (2 J - tr J) b has no power.
+    """
+
+    nodes = 1
+    of_step = "growth", "dt"
+
+    @property
+    def numbers(self) -> list[str]:
+        """Inertia (kg m²), and angular velocity of the frame (rad/s)."""
+        return [*(f"J{i}{j}" for i in range(3) for j in range(3)), *RATE]
+
+    def equations(self, at: Inputs) -> Equations:
+        """See the base class; the mean of the frames in the step makes the increment exact."""
+        turn, w = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0)), self.scheme.load_weight
+        frames = matrix(turn.q0), matrix(turn.q1)
+        frame = [
+            tuple(map(at.stage, add(scale(1.0 - w, x), scale(w, y))))
+            for x, y in zip(*frames, strict=True)
+        ]
+        J, rate = matrix_of(at, "J"), tuple(at[x] for x in RATE)
+        b = tuple(map(at.stage, transposed_times(frame, rate)))
+        Jb = tuple(map(at.stage, times(J, b)))
+        moment = scale(at["growth"], cross(rate, times(frame, Jb)))
+        if has_inertia(self.scheme):
+            H = subtract(scale(2.0, Jb), scale(J[0][0] + J[1][1] + J[2][2], b))
+            moment = add(moment, times(frame, scale(1 / at["dt"], cross(turn.m, H))))
+        on_node = turn.on_node(moment, at_end=acts_at_end(self.scheme))
+        return Equations([*NO_FORCE, *on_node], new_state([turn]))
+
+
+class LoadsInSpace(Block):
+    """Loads at nodes, whose rotations are states."""
+
+    remembers = True
+
+    def take_turns(self, turns: Array) -> None:
+        """Set the quaternions of the nodes, which ``turns`` has at their first rotations."""
+        n = self.statement.nodes
+        for k in range(n):
+            own = in_batches(
+                turns[np.reshape(self._elements.dofs, (-1, 6 * n))[:, 3 * n + k]], BATCH
+            )
+            first = len(self.statement.state) - 4 * (n - k)
+            self._states[:, first : first + 4] = own
+
+
+def own_work(statement: Statement) -> bool:
+    """Return whether a statement has the work of its load, as moments at the end of a step."""
+    return isinstance(statement, LoadOnNode) and acts_at_end(statement.scheme)
+
+
+def loads_in_space(setting: BlockSetting) -> list[Block]:
+    """Return the blocks of the loads of a scene in space, besides dead forces."""
+    loads = setting.scene.loads
+    moments = [x for x in loads if isinstance(x, PointLoad) and np.any(x.moment)]
+    moving = [x for x in loads if isinstance(x, MovingLoad)]
+    followers = [x for x in loads if isinstance(x, FollowerLoad)]
+    made = [
+        *_at_nodes("dead moments", moments, setting),
+        *_at_nodes("follower loads", followers, setting),
+        *_pressures([x for x in loads if isinstance(x, Pressure)], setting),
+        *_rotations([x for x in loads if isinstance(x, RotatingFrame)], setting),
+        *(moving_loads(moving, setting) if moving else ()),
+    ]  # fmt: skip
+    return [
+        (LoadsInSpace if isinstance(statement, StatementInSpace) else Block)(
+            statement, elements, setting, supplies=None if own_work(statement) else "loads"
+        )
+        for statement, elements in made
+    ]
+
+
+def _at_nodes(
+    name: str, loads: Sequence[LoadAtPlace], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    if loads:
+        subdomain, mine, follows = setting.subdomain, np.arange(len(loads)), name != "dead moments"
+        nodes = np.array([subdomain.local(subdomain.numbering.node(x.place)) for x in loads])
+        numbers = [
+            [*np.broadcast_to(x.moment, 3), *((*x.force, 0.0)[:3] if follows else ())]
+            for x in loads
+        ]
+        in_time = [InTime(load.amplitude, load) for load in loads]
+        yield LoadOnNode(setting.scheme, follows), Elements(
+            name, mine, nodes, np.array(numbers, float).T, in_time, {"factor": mine}
+        )  # fmt: skip
+
+
+def _pressures(
+    loads: Sequence[Pressure], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    if loads:
+        subdomain = setting.subdomain
+        pairs = [loaded_cells(load, subdomain) for load in loads]
+        cells = np.concatenate([cells for cells, _ in pairs])
+        of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
+        forces = np.array([[x.tangential, *np.broadcast_to(x.normal, 2)] for x in loads])[of_load]
+        lengths, axes = cell_axes(Fields(subdomain, cells))
+        shares = np.concatenate([shares for _, shares in pairs])
+        indices = subdomain.cells[cells] + len(subdomain.numbering.cells) * of_load
+        in_time = [InTime(load.amplitude, load) for load in loads]
+        yield PressureInSpace(setting.scheme), Elements(
+            "pressures", indices, subdomain.cell_dofs[cells],
+            [*forces.T, lengths, *axes.transpose(2, 1, 0).reshape(9, -1), *shares.T], in_time,
+            {"factor": of_load},
+        )  # fmt: skip
+
+
+def _rotations(
+    frames: Sequence[RotatingFrame], setting: BlockSetting
+) -> Iterator[tuple[Statement, Elements]]:
+    for frame in frames:  # one at most
+        subdomain, in_time = setting.subdomain, [InTime(steady, frame)]
+        numbering, scheme, bodies = subdomain.numbering, setting.scheme, setting.scene.bodies
+        fields, centre = Fields(subdomain), np.array((*frame.about, 0.0)[:3])
+        nodes = np.array([subdomain.local(numbering.node(x.middle)) for x in bodies], int)
+        lengths, axes = cell_axes(fields)
+        places = fields.coordinates().reshape(-1, 6) - np.tile(centre, 2)
+        masses = lengths * fields.section_values("rhoA").ravel()
+        body_places = np.reshape([x.center for x in bodies], (-1, 3)) - centre
+        for name, dofs, mass, at in (
+            ("rotation of cells", fields.cell_dofs[:, :6], masses, places),
+            (
+                "rotation of masses",
+                nodes.reshape(-1, 6)[:, :3],
+                [x.mass for x in bodies],
+                body_places,
+            ),
+        ):
+            if n := len(mass):
+                rates = np.tile(frame.rate, (n, 1)).T
+                yield ForceOfRotatingFrame(at.shape[1] // 3 - 1, scheme), Elements(
+                    name, np.arange(n), dofs, [np.array(mass), *rates, *at.T], in_time,
+                    {"growth": 0},
+                )  # fmt: skip
+        # Rotary inertia at the nodes of cells, half of each cell, and of bodies
+        J = np.repeat(rotary_inertia(fields, axes) * lengths[:, None, None] / 2, 2, axis=0)
+        J = np.concatenate([J, np.reshape([x.tensor for x in bodies], (-1, 3, 3))])
+        at_nodes = fields.cell_dofs.reshape(-1, 6, 2).transpose(0, 2, 1).reshape(-1, 6)
+        at_nodes = np.concatenate([at_nodes, nodes.reshape(-1, 6)])
+        some = np.flatnonzero(J.any(axis=(1, 2)))
+        rates = np.tile(frame.rate, (len(some), 1)).T
+        if len(some):
+            yield MomentOfRotatingFrame(scheme), Elements(
+                "rotation of inertia", some, at_nodes[some], [*J[some].reshape(-1, 9).T, *rates],
+                in_time, {"growth": 0},
+            )  # fmt: skip
