@@ -165,6 +165,13 @@ class Beam(Record, Member):
                 f"{self.name}: hinges are for resultants; fibres break by Fibres(softening=)"
             )
 
+    def third_axis(self, s: float) -> Point:
+        """Return axis 3 of the section at a place in space, for the chord of a cell about it."""
+        ends = (max(s - 0.5 / self.cells, 0.0), min(s + 0.5 / self.cells, 1.0))
+        a, b = (np.array(self.curve(x)) for x in ends)
+        normal = np.cross(b - a, np.array(self.up))
+        return tuple((normal / np.linalg.norm(normal)).tolist())
+
     def _label(self) -> str:
         return self.name
 

@@ -244,12 +244,13 @@ class Scene(Record, Rich):
         connectors += [c for x in self.connectors for c in x.components or (x,)]
         connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
+        d = 3 if self.in_space else 2
         bearing = [support.place for support in self.supports if 2 in support.held]
         bearing += [mass.place for mass in self.masses if mass.inertia]
         for connector in connectors if laws else ():
             by_a, by_b = connector.rigidly()
-            bearing += [connector.a] * bool(by_a[2] or connector.follows_a)
-            bearing += [connector.b] * bool(by_b[2])
+            bearing += [connector.a] * bool(any(by_a[d:]) or connector.follows_a)
+            bearing += [connector.b] * any(by_b[d:])
         loaded = [load.place for load in self.moments]
         rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
         return (*connectors, *plastic_hinges(laws, rigid, bearing, loaded))
@@ -266,7 +267,7 @@ class Scene(Record, Rich):
     @property
     def moments(self) -> list[LoadAtPlace]:
         """Loads with a moment at a place."""
-        return [load for load in self.loads if isinstance(load, LoadAtPlace) and load.moment]
+        return [x for x in self.loads if isinstance(x, LoadAtPlace) and np.any(x.moment)]
 
     @cached_property
     def rigid_bodies(self) -> tuple[Body, ...]:
@@ -415,7 +416,7 @@ def require_space(scene: Scene) -> None:
                 f"space have {', '.join(x.__name__ for x in IN_SPACE)}"
             )
         law = getattr(record, "law", None)
-        if has_friction(law) or isinstance(law, RigidPlastic):
+        if has_friction(law):
             raise ModelError(
                 f"{record._label()}: {type(law).__name__} is a law for scenes in the plane"
             )
@@ -439,10 +440,15 @@ def require_space(scene: Scene) -> None:
                 "space do not model this offset; make the section with centroid_only=True to "
                 "ignore it, or take a section whose shear centre is its centroid"
             )
-        if beam.hinges or section.section_points(section.hinge):
+        if section.interaction:
             raise ModelError(
-                f"{beam.name}: inelastic laws and hinges are for scenes in the plane; beams in "
-                "space are elastic"
+                f"{beam.name}: interaction of N and M is for scenes in the plane; beams in space "
+                "may have fibres, or laws axial, shear, shear3, twisting, bending2, bending, hinge"
+            )
+        if section.fibres and section.fibres.z is None:
+            raise ModelError(
+                f"{beam.name}: the fibres of its section have no z for bending about axis 2; use "
+                "Section.of_fibres(y, A, z=, torsion=)"
             )
 
 
