@@ -37,6 +37,7 @@ NAMES = {"name", "depth", "shape"}
 
 IN_SPACE = {
     "Spherical", "Beam.up", "Revolute.axis", "Turn.axis", "Section.centroid_only",
+    "Section.shear3", "Section.twisting", "Section.bending2",
 }  # fmt: skip
 """Effects and options of scenes in space; the stored scenes are in the plane."""
 

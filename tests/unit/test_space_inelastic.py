@@ -145,6 +145,46 @@ def test_hinges_of_zero_length_have_the_same_motion_in_space(law):
     assert max(np.ptp(one.motion) for one in histories[0]) > 0.01, "a hinge turns"
 
 
+SPRINGS = {
+    "softening spring": ub.Spring(300.0, softening=ub.LinearSoftening(8.0, fracture_energy=5.0)),
+    "exponential": ub.Spring(300.0, softening=ub.Softening(8.0, fracture_energy=5.0)),
+    "Bouc-Wen": ub.Spring(300.0, st.BoucWen(8.0, 0.1)),
+    "viscoplastic": ub.Spring(300.0, ub.ElastoPlastic(8.0, viscosity=ub.Perzyna(eta=30.0))),
+    "rigid-plastic": ub.RigidPlastic(ub.ElastoPlastic(8.0, kinematic=20.0)),
+    "rigid-softening": ub.RigidPlastic(ub.LinearSoftening(8.0, fracture_energy=5.0)),
+    "pinching": st.PinchingHinge(
+        300.0, st.Backbone(8.0, capping=0.1, post_capping=0.4), strength=1.0, kappa_F=0.4, kappa_D=0.3
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SPRINGS)
+def test_hinges_at_joints_have_the_same_motion_in_space(name):
+    runs = []
+    for at in (in_plane, skew):
+        flat = at is in_plane
+        section = ub.Section(**STIFF, **({} if flat else OTHER))
+        beam = ub.Beam(at(1, 0), at(5, 3), section, cells=3, **({} if flat else {"up": at(-3, 4)}))
+        axis = {} if flat else {"axis": tuple(TURN.apply([0, 0, 1.0]))}
+        places = ub.ground(*at(1, 0)), beam.start
+        load = ub.PointLoad(beam.end, force=at(-3, 4), amplitude=push)
+        scene = ub.Scene(
+            [beam], joints=[ub.Revolute(*places, **axis)], loads=[load],
+            connectors=[ub.Turn(*places, SPRINGS[name], **axis)],
+        )  # fmt: skip
+        runs.append(
+            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02, newton=EXACT, progress=False)
+        )
+    one, other = (run.connector(run.scene.connectors[0]) for run in runs)
+    assert np.ptp(one.motion) > 0.05
+    assert one.dissipated[-1] > 0.01
+    for field in ("motion", "force", "work", "dissipated"):
+        a, b = getattr(one, field), getattr(other, field)
+        assert np.abs(a - b).max() < 1e-11 * max(1.0, np.abs(a).max())
+    largest = runs[1].energy["loads"].max()
+    assert np.abs(runs[1].energy.imbalance).max() < 1e-12 * largest
+
+
 # -- all directions ------------------------------------------------------------------------------
 
 SIX = {

@@ -602,7 +602,7 @@ class States:
 
         ``forces`` are section forces in the middle of the cell; of a yielding cell, forces of its
         law for the strains at the stored time.  If a plastic hinge is at the
-        place, ``forces[:, 2]`` is the moment of the hinge in each step, ``jump`` its rotation, and
+        place, ``forces[:, -1]`` is the moment of the hinge in each step, ``jump`` its rotation, and
         ``hinge`` its dissipated energy.
 
         Raises:
@@ -613,7 +613,7 @@ class States:
         forces, jump, plastic, energy = map(np.array, states)
         if hinge is not None:
             history = self.connector(hinge)
-            forces[:, 2], jump, energy = history.force, history.motion, history.dissipated
+            forces[:, -1], jump, energy = history.force, history.motion, history.dissipated
         return Material(forces, jump, plastic, energy)
 
     def damage(self, n: int = -1) -> tuple[Array, Array]:
