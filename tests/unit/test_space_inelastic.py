@@ -42,12 +42,14 @@ def skew(x, y):
     return tuple(TURN.apply([x, y, 0.0]))
 
 
-def cantilever(section, at, *, amplitude, hinges=None, size=1.0):
+def cantilever(section, at, *, amplitude, hinges=None, size=1.0, damping=()):
     """A beam of five cells, pushed across at its end; vectors of the plane go through ``at``."""
     up = {} if at is in_plane else {"up": at(-3, 4)}
     beam = ub.Beam(at(1, 0), at(5, 3), section, cells=5, hinges=hinges or {}, **up)
     load = ub.PointLoad(beam.end, force=at(-3 * size, 4 * size), amplitude=amplitude)
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[*damping]
+    )  # fmt: skip
 
 
 def in_both(scheme, laws, *, end=1.0, amplitude, tolerance=1e-12, **more):
@@ -145,6 +147,27 @@ def test_hinges_of_zero_length_have_the_same_motion_in_space(law):
     assert max(np.ptp(one.motion) for one in histories[0]) > 0.01, "a hinge turns"
 
 
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
+def test_viscous_beams_have_the_same_motion_in_space(scheme):
+    laws, damping = RESULTANTS["bending"], [ub.KelvinVoigt(0.05)]
+    runs = in_both(scheme, laws, amplitude=push, end=0.7, damping=damping)
+    assert runs[1].energy["damping"][-1] > 1e-3 * runs[1].energy["loads"].max()
+
+
+def test_creep_under_torsion_in_space():
+    """The angle T L/GJ (1 - exp(-t/τ)), in steps of backward Euler (1 + dt/τ)^-n."""
+    beam = ub.Beam((0, 0, 0), (1, 2, 2), ub.Section(**STIFF, **OTHER), cells=2, up=(1, 0, 0))
+    axis, τ, dt = np.array([1, 2, 2]) / 3, 0.5, 0.1
+    load = ub.PointLoad(beam.end, moment=tuple(4.0 * axis), amplitude=lambda t: float(t > 0))
+    scene = ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[ub.KelvinVoigt(τ)]
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, newton=EXACT)
+    angle = run.displacement(beam.end)[:, 3:] @ axis
+    exact = 4.0 * 3.0 / 400.0 * (1 - (1 + dt / τ) ** -np.arange(11.0))
+    assert np.abs(angle - exact).max() < 1e-12
+
+
 SPRINGS = {
     "softening spring": ub.Spring(300.0, softening=ub.LinearSoftening(8.0, fracture_energy=5.0)),
     "exponential": ub.Spring(300.0, softening=ub.Softening(8.0, fracture_energy=5.0)),
@@ -153,7 +176,8 @@ SPRINGS = {
     "rigid-plastic": ub.RigidPlastic(ub.ElastoPlastic(8.0, kinematic=20.0)),
     "rigid-softening": ub.RigidPlastic(ub.LinearSoftening(8.0, fracture_energy=5.0)),
     "pinching": st.PinchingHinge(
-        300.0, st.Backbone(8.0, capping=0.1, post_capping=0.4), strength=1.0, kappa_F=0.4, kappa_D=0.3
+        300.0, st.Backbone(8.0, capping=0.1, post_capping=0.4), strength=1.0, kappa_F=0.4,
+        kappa_D=0.3,
     ),
 }  # fmt: skip
 

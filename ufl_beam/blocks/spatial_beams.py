@@ -15,6 +15,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import BeamCells, InelasticCells, alike
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.damping import viscous_cells
 from ufl_beam.blocks.nodes_in_space import (
     change,
     new_state,
@@ -24,6 +25,7 @@ from ufl_beam.blocks.nodes_in_space import (
     vector,
 )
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import (
     STIFFNESS_IN_SPACE,
@@ -50,7 +52,7 @@ from ufl_beam.mechanics.spatial_kinematics import (
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.loads import PointLoad
+from ufl_beam.model.loads import KelvinVoigt, PointLoad
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class CellInSpace(StatementInSpace):
         return int(has_inertia(self.scheme))
 
     @property
-    def modes(self) -> list[str]:
+    def modes(self) -> Sequence[str]:
         """In statics the same as of :class:`~ufl_beam.blocks.beams.BeamCell`."""
         at_rest = [*(f"about {x}" for x in self.unknowns), "moved", "reached"]
         return [] if has_inertia(self.scheme) else at_rest
@@ -104,7 +106,7 @@ class CellInSpace(StatementInSpace):
         return ["h", *(f"R{i}{j}" for i in range(3) for j in range(3)), *inertia]
 
     @property
-    def of_step(self) -> list[str]:
+    def of_step(self) -> Sequence[str]:
         """Length of the step, and coefficients of its rates."""
         return ["dt", "rates 0 0", "rates 0 1"] if has_inertia(self.scheme) else []
 
@@ -129,7 +131,7 @@ class CellInSpace(StatementInSpace):
             tuple(map(at.stage, _strains(middle, slope, axes, h)))
             for middle, slope in zip((old, now), slopes, strict=True)
         )
-        predicted = () if self.rates else self._predicted(at, q0, u[0], axes)
+        predicted = self._predicted(at, q0, u[0], axes) if "moved" in self.modes else ()
         r, more = self.response(at, e0, e1, predicted)
         pair, tangents = turns, [add(transposed_times(axes, FIRST), slope) for slope in slopes]
         if at_end:
@@ -233,6 +235,29 @@ class InelasticCellInSpace(CellInSpace):
         return r, {"strains": e1, "predicted": predicted}
 
 
+@dataclass(frozen=True)
+class ViscousCellInSpace(CellInSpace):
+    """Cell whose resultants are in proportion to strain rates, besides those of other laws."""
+
+    rates = 0
+    modes = ()
+    of_step = ("dt",)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Retardation time (s), stiffnesses, and those of the base class."""
+        return ["time", *STIFFNESS_IN_SPACE, *super().numbers]
+
+    def response(
+        self, at: Inputs, e0: Vector, e1: Vector, predicted: Vector
+    ) -> tuple[list[Expr], dict[str, Any]]:
+        """See the base class."""
+        growth, factor = subtract(e1, e0), at["time"] / at["dt"]
+        own = zip(STIFFNESS_IN_SPACE, growth, strict=True)
+        r = tuple(at.stage(factor * at[name] * x) for name, x in own)
+        return [*r], {"lost": {"damping": at["h"] * dot(r, growth)}}
+
+
 def _same(x: Expr) -> Expr:
     return x
 
@@ -319,11 +344,25 @@ class InelasticCellsInSpace(InelasticCells):
         return InelasticCellInSpace(alike(scheme)), _geometry(fields, scheme, float(number == 0))
 
 
-def _geometry(fields: Fields, scheme: Scheme, inertia: float = 1.0) -> list[Array]:
+def viscosity_in_space(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:
+    """Return the block of a viscosity, which has its own copies of quaternions."""
+    some = viscous_cells(damping, fields)
+    stiffness = some.section_values(*STIFFNESS_IN_SPACE).T
+    numbers = [np.full(len(some.order), damping.retardation_time), *stiffness]
+    elements = Elements(
+        "viscosity", some.subdomain.cells[some.order], some.cell_dofs,
+        [*numbers, *_geometry(some)], cells=some.order, force_kind=lib.STRESS,
+    )  # fmt: skip
+    block = Block(ViscousCellInSpace(setting.scheme), elements, setting, kind="damping")
+    block.in_cells = []
+    return block
+
+
+def _geometry(fields: Fields, scheme: Scheme | None = None, inertia: float = 1.0) -> list[Array]:
     """Return lengths, axes and, in dynamics, rotary inertia times a factor of cells."""
     lengths, axes = cell_axes(fields)
     numbers = [lengths, *axes.transpose(2, 1, 0).reshape(9, -1)]
-    if has_inertia(scheme):
+    if scheme is not None and has_inertia(scheme):
         numbers += [*inertia * rotary_inertia(fields, axes).reshape(-1, 9).T]
     return numbers
 

@@ -56,6 +56,7 @@ from ufl_beam.model.loads import (
     LOADS,
     Damping,
     Gravity,
+    KelvinVoigt,
     LineLoad,
     Load,
     LoadAtPlace,
@@ -400,7 +401,7 @@ class Scene(Record, Rich):
 
 IN_SPACE = (
     Beam, Body, Rigid, Revolute, Spherical, Prismatic, RigidLink, Link, Turn, Stretch, Slide,
-    Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity,
+    Clamped, Pinned, PointLoad, LineLoad, Gravity, Velocity, KelvinVoigt,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
 

@@ -281,7 +281,7 @@ class Section(Record):
         cls, y: Sequence[float], A: Sequence[float], *, E: float | Sequence[float], nu: float,
         fibres: Fibres | Sequence[Fibres], rho: float | Sequence[float] | None = None,
         shear_factor: float = 5 / 6, z: Sequence[float] | None = None,
-        torsion: float | None = None, shear_factor3: float = 5 / 6,
+        torsion: float | None = None, shear_factor3: float | None = None,
     ) -> Section:  # fmt: skip
         """Create a section of fibres with areas ``A`` (m²) at coordinates ``y`` (m).
 
@@ -293,8 +293,8 @@ class Section(Record):
         ``shear_factor EA / (2 (1 + nu))``.
 
         In space, ``y`` and ``z`` (m) are coordinates along axes 2 and 3 of the section, which are
-        principal axes, and ``torsion`` is the torsion constant, see :meth:`of_shape`.  Torsion and
-        shear are elastic.
+        principal axes, ``torsion`` is the torsion constant, and ``shear_factor3`` that for GA3, by
+        default equal to ``shear_factor``, see :meth:`of_shape`.  Torsion and shear are elastic.
 
         Raises:
             ModelError: The sequences differ in length, an area or modulus is not positive, all
@@ -332,6 +332,8 @@ class Section(Record):
         density = _each(0.0 if rho is None else rho, len(at), f"{what}: rho")
         if not (moduli > 0).all() or not (density >= 0).all():
             raise ModelError(f"{what}: E must be positive, and rho must not be negative")
+        if z is None and (torsion is not None or shear_factor3 is not None):
+            raise ModelError(f"{what}: torsion and shear_factor3 are for fibres in space; give z")
         across = None if z is None else require_array(z, f"{what}: z")
         if across is not None and across.shape != at.shape:
             raise ModelError(f"{what}: {across.size} coordinates z of {len(at)} fibres")
@@ -345,7 +347,8 @@ class Section(Record):
                     f"{what}: axes 2 and 3 must be principal axes with bending stiffnesses; the "
                     f"sums of E A z² and E A y z are {EI2:.3g} and {product:.3g} N m²"
                 )
-            in_space = {"I2": EI2 / mean, "torsion": torsion, "shear_factor3": shear_factor3}
+            factor = shear_factor if shear_factor3 is None else shear_factor3
+            in_space = {"I2": EI2 / mean, "torsion": torsion, "shear_factor3": factor}
             in_space |= {} if rho is None else {"rhoI2": mass @ placed.z**2}
         return cls._from_material(
             total, placed.EI / mean, mean, nu, None, shear_factor,

@@ -25,6 +25,7 @@ from ufl_beam.blocks.spatial_beams import (
     InelasticCellsInSpace,
     bodies_in_space,
     dead_moments,
+    viscosity_in_space,
 )
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
@@ -145,14 +146,18 @@ class StepEquation:
             if inertia.loses_energy:
                 ledger.lost["numerical"] += 0.0
             others.append(inertia)
+        viscous = list[Block]()
         for damping in scene.damping:
             if isinstance(damping, Rayleigh):
                 others += rayleigh_forces(damping, fields, *setting, inertia)
                 if damping.tangent:
                     others += tangent_damping(damping, subset, self.inelastic, in_blocks)
+            elif scene.in_space:
+                viscous.append(viscosity_in_space(damping, fields, in_blocks))
             else:
                 others.append(viscosity(damping, fields, in_blocks))
-        own = self.nodes_in_space or self.inelastic
+        others += viscous
+        own = [*self.nodes_in_space, *viscous] or self.inelastic
         self.remembering: list[Any] = [*own, *self.connector_terms]
         self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
