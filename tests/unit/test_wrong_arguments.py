@@ -198,7 +198,8 @@ QUANTITIES = {"u": lambda s: s.displacement(BEAM.end)}
 OWN = {
     # sections and materials
     "Section": {"rhoA": (0.0, optional(FROM_ZERO)), "hinge": (None, optional(NO_SOFTENING)),
-        "shape": (None, optional(OBJECT)), **alike(None, optional(NO_LAW), "axial bending bending2 shear3 twisting")},
+        "shape": (None, optional(OBJECT)),
+        **alike(None, optional(NO_LAW), "axial bending bending2 shear3 twisting")},
     "Shape": {
         "corners": ([(0, 0), (1, 0, 0.1), (1, 1)], [
             None, 1.0, "ab", [], [1.0], [(0, 0), (1, 0)], [(0, 0), (1, 0), (1,)],

@@ -11,13 +11,14 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint
+from ufl_beam.model.sections import IN_SPACE
 
 TURNS = "turns"
 """Column of a state with the quaternions of the nodes; the first number is the real part minus 1,
 so that all numbers begin with zero."""
 
 
-STIFFNESS_IN_SPACE = "EA", "GA", "GA3", "GJ", "EI2", "EI"
+STIFFNESS_IN_SPACE = tuple(IN_SPACE.values())
 """Stiffnesses for the strains along the axes 1, 2, 3 of a section, and curvatures about them."""
 
 

@@ -52,7 +52,8 @@ class Beam(Record, Member):
             ``{0.0: Softening(limit, fracture_energy)}``.  A law is a :class:`SofteningLaw` or
             :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  A hinge is
             rigid until its moment reaches the limit of the law.  At an end of the beam, the law
-            replaces ``Section(hinge=)``, and ``None`` removes the hinge of the section.
+            replaces ``Section(hinge=)``, and ``None`` removes the hinge of the section.  In space
+            hinges are about axis 3 of the section.
         up: In space, a vector in the plane of the axes 1 and 2 of the section: axis 1 is along the
             beam, axis 2 is the part of ``up`` across it, and axis 3 is normal to both.  By default
             ``(0, 0, 1)``.

@@ -173,7 +173,7 @@ class Turn(Connector):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     In space, the motion is the component of the rotation vector along an ``axis`` that is fixed in
-    both places, up to 180 degrees.
+    both places, below 360 degrees.
 
     Example:
         >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad

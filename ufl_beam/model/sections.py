@@ -82,7 +82,8 @@ class Section(Record):
         shear3, twisting, bending2: In space, inelastic laws of the shear force along axis 3, the
             torsional moment, and the bending moment about axis 2; N, N m, N m.
         hinge: Law of the hinge that opens in each cell where the moment reaches the limit of the
-            law; N m, J.  For hinges at chosen places see :class:`Beam`.
+            law; N m, J.  For hinges at chosen places see :class:`Beam`.  In space it is about axis
+            3, with a warning if a run ends with a jump above 90 degrees.
         fibres: Fibres with their positions, instead of laws of resultants and of the hinge.  They
             come from :meth:`of_fibres`, or from shapes such as :meth:`rectangle`.
         shape: Shape of a homogeneous section, with its area and moduli, such as ``shape.Wpl``.  It
