@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import ufl_beam as ub
 import ufl_beam.structures as st
+from ufl_beam.model.constraint_checks import parts_that_switch
 
 EXACT = ub.Newton(rtol=1e-13)
 TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
@@ -497,6 +498,12 @@ def test_refused_by_name():
         ub.Section.of_fibres([-0.1, 0.1], [1e-3, 1e-3], z=[0.1, 0.1], **material)
     with pytest.raises(ub.ModelError, match="axes 2 and 3 must be principal axes"):
         ub.Section.of_fibres([-0.1, 0.1], [1e-3, 1e-3], z=[-0.1, 0.1], **material)
+
+
+def test_parts_that_yield_in_space_only():
+    for name, law in SIX.items():
+        beam = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**STIFF, **OTHER, **{name: law}))
+        assert [part for part, _ in parts_that_switch(ub.Scene([beam]))] == [beam.name], name
 
 
 def test_starts_that_space_does_not_have():

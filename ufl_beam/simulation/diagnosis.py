@@ -298,7 +298,7 @@ def _describe(
     laws = (
         law
         for section in sections
-        for points in section.section_points(None)
+        for points in section.section_points(None, numbering.scene.in_space)
         for law, _ in points.laws
     )
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
@@ -366,7 +366,7 @@ class LedgerWatch:
         self._numbering, self._tolerance = numbering, tolerance
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
-            points = beam.section.section_points(beam.section.hinge)
+            points = beam.section.section_points(beam.section.hinge, numbering.scene.in_space)
             if not all(class_points.elastic for class_points in points):
                 laws += [law for class_points in points for law, _ in class_points.laws]
         springs = [
