@@ -422,8 +422,7 @@ void add_energy_of_block(void *self, const time_step *step, const double *q1, co
 
 /* Largest residual of a law. Residuals of motions are divided by 1 % of `moved`, which is at most the size of the
  * scene; residuals of forces are divided by `scale`. Round-off of the motions does not count; it grows with the
- * distance from the initial position and with the number of turns. In space, with twelve motions, rotations of any
- * size have the round-off of quaternions.
+ * distance from the initial position and with the number of turns.
  *
  * A law with internal variables computes its force from the elastic part of a motion, which has the round-off of the
  * motions at both ends of the step. Times the elastic stiffness it is all that remains of the force of a spring that
@@ -439,7 +438,7 @@ double missed_by_block(void *self, const double *q, const double *r, double scal
     for (int l = 0; l < elements_in(b, c); ++l) {
       const int32_t *dofs = b->dofs + (size_t)c * b->unknowns * n + l;
       const double *slope = *b->each + ((size_t)c * b->force_of->outputs + b->unknowns) * n + l;
-      double far = motions == 12 ? fmax(1, amplitude) : amplitude;
+      double far = amplitude;
       for (int i = 0; i < motions; ++i)
         far = fmax(far, amplitude + fabs(q[dofs[i * n]]) / (3 * i < 2 * motions ? b->scene : 1));
       for (int j = 0; j < k; ++j, slope += (k + 2) * n) {
