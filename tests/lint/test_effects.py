@@ -38,7 +38,8 @@ NAMES = {"name", "depth", "shape"}
 IN_SPACE = {
     "Spherical", "Universal", "Cylindrical", "Beam.up", "Revolute.axis", "Turn.axis",
     "Section.centroid_only", "PrescribedDisplacement.axis", "PrescribedDisplacement.up",
-    "PrescribedDisplacement.w",
+    "PrescribedDisplacement.w", "Section.shear3", "Section.twisting",
+    "Section.bending2",
 }  # fmt: skip
 """Effects and options of scenes in space; the stored scenes are in the plane."""
 

@@ -198,7 +198,8 @@ QUANTITIES = {"u": lambda s: s.displacement(BEAM.end)}
 OWN = {
     # sections and materials
     "Section": {"rhoA": (0.0, optional(FROM_ZERO)), "hinge": (None, optional(NO_SOFTENING)),
-        "shape": (None, optional(OBJECT)), **alike(None, optional(NO_LAW), "axial bending")},
+        "shape": (None, optional(OBJECT)),
+        **alike(None, optional(NO_LAW), "axial bending bending2 shear3 twisting")},
     "Shape": {
         "corners": ([(0, 0), (1, 0, 0.1), (1, 1)], [
             None, 1.0, "ab", [], [1.0], [(0, 0), (1, 0)], [(0, 0), (1, 0), (1,)],
@@ -221,6 +222,7 @@ OWN = {
         "y": ([0.0, 1.0], [*FIBRES, [0.0, 0.0], [0.0, HUGE]]),
         "A": ([1.0, 1.0], [*FIBRES, [1.0, -1.0], [1.0, 0.0]]),
         "E": ([1.0, 1.0], [*OF_EACH, None, 0.0]), "rho": (0.0, OF_EACH),
+        "z": (None, [*FIBRES[1:], [0.0, 1.0], [1.0, 1.0]]),
         "fibres": ([ub.Fibres(LAW)] * 2, [*NO_LAW, [ub.Fibres(LAW)], [ub.Fibres(LAW), LAW]]),
     },
     "Section.reinforced": {"y": ([-0.3, 0.3], [*FIBRES, 0.3, [0.0, 0.6], [0.0]]),

@@ -235,8 +235,8 @@ class BeamCells(Block):
         in_time, imposed = imposed_strains(fields, strains)
         elements = Elements(
             name, fields.subdomain.cells[fields.order], fields.cell_dofs, [*numbers, *imposed],
-            in_time, {name: k for k, name in enumerate(statement.of_step)}, cells=fields.order,
-            force_kind=lib.STRESS,
+            in_time, dict(zip(statement.of_step, range(len(in_time)), strict=False)),
+            cells=fields.order, force_kind=lib.STRESS,
         )  # fmt: skip
         super().__init__(statement, elements, setting, kind="beams")
         self.name, self.fields, self.prediction = name, fields, None
@@ -323,16 +323,14 @@ def alike(scheme: Any) -> Any:
 TANGENTS = "committed tangents"
 """Name of the tangents for damping in saved data."""
 
-WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-"""Factors of :attr:`Points.recorded` that remove the jump of a fibre in cells without a hinge."""
-
 
 class InelasticCells(BeamCells):
     """Cells with material points, which may yield, flow or break.
 
     Attributes:
         points: Material points.
-        recorded_factors: Factors of :attr:`Points.recorded` in :meth:`sections`; (6,).
+        recorded_factors: Factors of :attr:`Points.recorded` in :meth:`sections`, zero for the jump
+            of a fibre.
     """
 
     def __init__(
@@ -341,11 +339,9 @@ class InelasticCells(BeamCells):
     ) -> None:  # fmt: skip
         numbering, degree = fields.subdomain.numbering, fields.degree
         some = [x for x in strains if np.isin(numbering.cells_of(x.beam), cells).any()]
-        statement = InelasticCell(degree, alike(setting.scheme), functions_of(some))
+        statement, numbers = self.stated(fields, setting.scheme, some, section_points.number)
         name = f"cells with points {section_points.number}"
-        shifts = np.zeros((3 * degree, len(fields.order)))
-        super().__init__(statement, name, fields, setting, some, [*shifts, *axes(fields)])
-        self.recorded_factors = np.ones(6) if section_points.hinges else WITHOUT_JUMP
+        super().__init__(statement, name, fields, setting, some, numbers)
         own = self._elements.indices
         # Rows of saved states: other points of the same cells have other rows.
         self._rows = own + section_points.number * len(numbering.cells)
@@ -354,7 +350,9 @@ class InelasticCells(BeamCells):
             section_points, keys, lengths, setting.scheme, setting.search, predicts=True
         )
         self.must_dissipate = points.must_dissipate
-        made, order, n = self._kernels, statement.modes, len(lengths)
+        self.recorded_factors = np.ones(points.recorded.shape[1])
+        self.recorded_factors[len(section_points.rest)] = section_points.hinges
+        made, order = self._kernels, statement.modes
         rows = in_batches(
             np.arange(len(own) * made.strains, dtype=np.int32).reshape(len(own), -1), BATCH
         )
@@ -368,10 +366,10 @@ class InelasticCells(BeamCells):
             at_r=order.index("r 0"), at_D=order.index("D 0"),
         )  # fmt: skip
         if self.prediction is not None:
-            forces, last_b, e, change = np.zeros((4, n, 3))
+            forces, last_b, e, change = np.zeros((4, *points.r.shape))
             fill(
                 self._sections, forces=forces, last_b=last_b, e=e, change=change,
-                last_D=np.zeros((n, 9)), at_predicted=order.index("predicted 0"),
+                last_D=np.zeros_like(points.D), at_predicted=order.index("predicted 0"),
                 predicted=inserted_cells(made.predicted, w, dofs, row=rows),
             )  # fmt: skip
         names = "add_inelastic_force", "add_inelastic_tangent"
@@ -379,6 +377,15 @@ class InelasticCells(BeamCells):
         self.loops = force, tangent
         if points.c.line:
             self.law_residual = loop("missed_by_points", self._sections)
+
+    @staticmethod
+    def stated(
+        fields: Fields, scheme: Scheme, strains: Sequence[ImposedStrain], number: int
+    ) -> tuple[Any, list[Array]]:
+        """Return the statement of cells, and their numbers, for the points with a number."""
+        shifts = np.zeros((3 * fields.degree, len(fields.order)))
+        statement = InelasticCell(fields.degree, alike(scheme), functions_of(strains))
+        return statement, [*shifts, *axes(fields)]
 
     # -- in C ----------------------------------------------------------------------------------
 
@@ -406,12 +413,12 @@ class InelasticCells(BeamCells):
         self.points.start(strains)
         self.points.refresh(strains)
         self.points.start_tangents()
-        if before := len(self.statement.state):
+        if self.imposed and (before := len(self.statement.state)):
             self._states[:] = in_batches(self.points.recorded[:, :3].reshape(-1, before), BATCH)
 
     def strains(self, q: Array) -> Array:
         """Return the strains at ``q`` minus the imposed strains of the step; (sections, 3)."""
-        return self._along(self._kernels.strain, q, []).reshape(-1, 3)
+        return self._along(self._kernels.strain, q, []).reshape(self.points.r.shape)
 
     def _respond(self, q: Array) -> None:
         lib.respond_at(self._sections, doubles(q))

@@ -218,18 +218,21 @@ def tangent_damping(
     yield from (DampedCells(damping, cells, setting) for cells in inelastic)
 
 
-def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:
-    """Return the block of a viscosity."""
-    setting.ledger.lost["damping"] += 0.0
+def viscous_cells(damping: KelvinVoigt, fields: Fields) -> Fields:
+    """Return the cells of a viscosity."""
     subdomain, numbering = fields.subdomain, fields.subdomain.numbering
     beams = numbering.scene.beams if damping.beams is None else damping.beams
     pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)
     cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
-    some = Fields(subdomain, np.flatnonzero(np.isin(subdomain.cells, cells)))
+    return Fields(subdomain, np.flatnonzero(np.isin(subdomain.cells, cells)))
+
+
+def viscosity(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:
+    """Return the block of a viscosity."""
+    setting.ledger.lost["damping"] += 0.0
+    some = viscous_cells(damping, fields)
     elements = _on_cells("viscosity", [damping.retardation_time, *_stiffness(some)], some)
-    return Block(
-        Viscosity(numbering.mesh.degree, setting.scheme), elements, setting, kind="damping"
-    )
+    return Block(Viscosity(some.degree, setting.scheme), elements, setting, kind="damping")
 
 
 def second_differences(fields: Fields, setting: BlockSetting) -> Block:

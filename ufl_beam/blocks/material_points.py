@@ -286,7 +286,8 @@ class Points:
     Attributes:
         c: ``points`` of loops.h.
         names: Names of the inputs of a point.
-        strains: Strains of the cells in the latest response; (cells, 3); 1, 1, 1/m.
+        strains: Strains of the cells in the latest response; (cells, 3); 1, 1, 1/m; in space
+            (cells, 6).
         r, D: The latest response, see :meth:`return_map`.
         softens: True if points may break.
         must_dissipate: True if a law must not give energy.
@@ -297,7 +298,7 @@ class Points:
             :meth:`start_tangents`.  None if there is no such damping.
         recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
             the energies that plastic strains and discontinuities have dissipated since the
-            beginning; (cells, 6); N, N, N m, rad or m, J, J.
+            beginning; (cells, 6), in space (cells, 9); N, N, N m, rad or m, J, J.
         sums: Sums of ``point_output`` of loops.h over all cells, in the last step; J.
     """
 
@@ -318,6 +319,7 @@ class Points:
         self.must_dissipate = section_points.kind.law.must_dissipate
         self.names, law = inputs(section_points), section_points.kind.law
         cells, per_cell, width = len(length), len(section_points.weights), len(self.names)
+        m = len(section_points.rest)
         n = cells * per_cell
         self._padded = np.zeros((-(-n // BATCH) * BATCH, width))
         self._storage = storage = self._padded[:n].reshape(cells, per_cell, width)
@@ -344,10 +346,10 @@ class Points:
                 self._at[f"softening {name}"][:] = value
             self._update_resistance()
 
-        self.recorded = np.zeros((cells, int(lib.POINT_KEPT)))
+        self.recorded = np.zeros((cells, m + int(lib.POINT_KEPT)))
         self.sums = np.zeros(int(lib.POINT_OUTPUTS))
-        self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
-        self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
+        self.r, self.D = np.zeros((cells, m)), np.zeros((cells, m * m))
+        self._e0, self.strains = np.zeros((2, cells, m))
         self.over = np.zeros(1)
         self.damped: Any = None
 
@@ -359,13 +361,13 @@ class Points:
         }
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         self.c = struct(
-            "points", cells=cells, of_cell=per_cell, width=width, w=storage,
+            "points", cells=cells, of_cell=per_cell, width=width, strains=m, w=storage,
             theta=scheme.theta, length=np.ascontiguousarray(length), **arrays,
             law=forms.law, resistance=forms.resistance, end=forms.end, solves=law.solves,
             components=self._components, variables=len(law.variables),
             strain=self.names.index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.recorded, sum=self.sums,
-            own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search,
+            own=forms.own, over=self.over, unlike=np.zeros(m), search=self._search,
         )  # fmt: skip
         if per_cell >= BATCH:
             fill(self.c, **forms.loops | {"answers": np.tile(forms.loops["answers"], per_cell)})
@@ -535,7 +537,8 @@ class Points:
         elastic = theta * change**2 @ section_points.rest
         for name, by_point in zip(self._rows("stiffness"), self._at_points(change), strict=True):
             elastic += (theta * self[name] * by_point**2) @ section_points.weights
-        now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
+        D = self.D.reshape(len(change), change.shape[1], -1)
+        now = np.einsum("ci,cij,cj->c", change, D, change)
         return np.array([now, elastic])
 
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
@@ -619,10 +622,9 @@ class Points:
 
         Call :meth:`start` and :meth:`refresh` afterwards if strains or laws differ from that state.
         """
-        ends = np.arange(1, len(self._state_names) + 1) * self._storage.shape[1]
-        *variables, recorded, e0, stored = np.split(
-            rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1
-        )
+        of_cell = self._storage.shape[1], self.recorded.shape[1], self._e0.shape[1]
+        widths = [of_cell[0]] * len(self._state_names) + [*of_cell[1:]]
+        *variables, recorded, e0, stored = np.split(rows, np.cumsum(widths), axis=1)
         for name, values in zip(self._state_names, variables, strict=True):
             self[name][:] = values
         self.recorded[:], self._e0[:] = recorded, e0
@@ -638,12 +640,13 @@ class Points:
         state, volume = self._equations.state(self._at), section_points.weights * length
         relieved = self["jump"] / self["length"]
         e = law.as_argument(tuple(x - relieved for x in self._at_points(strains)))
-        self.recorded[:, :3] = section_points.rest * strains
+        resultants = self.recorded[:, : len(section_points.rest)]
+        resultants[:] = section_points.rest * strains
         for k, stress in enumerate(law.as_tuple(law.stress(e, state))):
             forces = (section_points.weights * stress) @ section_points.strains[
                 k :: self._components
             ]
-            self.recorded[:, :3] += forces
+            resultants += forces
         rest_energy = strains**2 @ section_points.rest / 2 * length[:, 0]
         self.sums[3] = np.sum(volume * law.elastic_energy(e, state)) + np.sum(rest_energy)
         self.sums[4] = np.sum(volume * law.hardening_energy(state))

@@ -11,20 +11,22 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import BlockSetting
 from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.material_points import EXHAUSTED, FREED_STIFFNESS
+from ufl_beam.blocks.nodes_in_space import quaternion_names
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.mechanics.connector_equations import (
     RigidPlasticStep,
     parameters,
     rigid_plastic_step,
 )
 from ufl_beam.model.bodies import Place
-from ufl_beam.model.connectors import Connector, law_of
+from ufl_beam.model.connectors import Connector, law_of, place_of
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
@@ -200,8 +202,25 @@ class HingeBlock(ConnectorBlock):
 
     def start(self, q: Array) -> None:
         """See the base class: take the motions of the nodes as the accepted motions."""
-        self.state["start"][:] = in_batches(self.motion(q)[:, None], BATCH)[:, 0]
+        self.state["start"][:] = in_batches(self.motion_at_begin(q)[:, None], BATCH)[:, 0]
         super().start(q)
+
+    def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
+        """Return the places in the states of quaternions of vertices in no cell, in space."""
+        names, pairs = self.statement.state, list[tuple[int, int, int]]()
+        for hinge in {*numbering.scene.hinges} & {*self.connectors}:
+            vertex = numbering.vertex(place := place_of(hinge))
+            if vertex not in numbering.cells:
+                turn = names.index(quaternion_names(int(hinge.b is place))[0])
+                pairs.append((self.connectors.index(hinge), turn, vertex))
+        own, first, vertices = np.reshape(pairs, (-1, 3)).astype(np.int64).T
+        row = own // BATCH * len(names) + first
+        return (row[:, None] + np.arange(4)) * BATCH + own[:, None] % BATCH, vertices
+
+    @property
+    def states(self) -> Array:
+        """States of all hinges, in batches."""
+        return self._states
 
     def remaining(self) -> Array:
         """See the base class."""

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Statements of beams and bodies in space: elastic cells, and the rotation of masses."""
+"""Statements of beams and bodies in space: cells, and the rotation of masses."""
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -13,8 +14,9 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.blocks.beams import alike
+from ufl_beam.blocks.beams import BeamCells, InelasticCells, alike
 from ufl_beam.blocks.block import Block, BlockSetting, Elements
+from ufl_beam.blocks.damping import viscous_cells
 from ufl_beam.blocks.nodes_in_space import (
     FIRST,
     StatementInSpace,
@@ -25,7 +27,7 @@ from ufl_beam.blocks.nodes_in_space import (
     vector,
 )
 from ufl_beam.blocks.statement import Equations, Inputs
-from ufl_beam.compiled.c_library import fill, lib, loop, struct
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import (
     STIFFNESS_IN_SPACE,
@@ -49,8 +51,10 @@ from ufl_beam.mechanics.spatial_kinematics import (
     times,
     transposed_times,
 )
-from ufl_beam.mechanics.time_scheme import acts_at_end, has_inertia
-from ufl_beam.terms.term import Callbacks, Phases
+from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
+from ufl_beam.model.fibres import SectionPoints
+from ufl_beam.model.imposed_strains import ImposedStrain
+from ufl_beam.model.loads import KelvinVoigt
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ class InertiaInSpace(StatementInSpace):
         return 1 + self.scheme.uses_last_step if has_inertia(self.scheme) else 0
 
     @property
-    def of_step(self) -> list[str]:
+    def of_step(self) -> Sequence[str]:
         """Length of the step, and coefficients of its rates."""
         return ["dt", *(f"rates 0 {j}" for j in range(1 + self.rates))] if self.rates else []
 
@@ -76,8 +80,8 @@ class InertiaInSpace(StatementInSpace):
 
 
 @dataclass(frozen=True)
-class ElasticCellInSpace(InertiaInSpace):
-    """Elastic cell of two nodes; in dynamics with the moments of its rotating inertia.
+class CellInSpace(InertiaInSpace):
+    """Cell of two nodes; in dynamics with the moments of its rotating inertia.
 
     The inertia of the scene is a constant matrix in velocities in axes of the nodes.  The momentum
     of a node turns with it, which adds a moment without power.
@@ -85,26 +89,28 @@ class ElasticCellInSpace(InertiaInSpace):
 
     nodes = 2
     inserts = True
+    functions = 0
 
     @property
-    def state(self) -> list[str]:
-        """Quaternions of the nodes; changes of strains in the last step, and its length (s)."""
-        return [*super().state, *LAST_CHANGES * bool(self.scheme.lost_fraction)]
-
-    @property
-    def modes(self) -> list[str]:
+    def modes(self) -> Sequence[str]:
         """In statics the same as of :class:`~ufl_beam.blocks.beams.BeamCell`."""
         at_rest = [*(f"about {x}" for x in self.unknowns), "moved", "reached"]
         return [] if has_inertia(self.scheme) else at_rest
 
     @property
     def numbers(self) -> list[str]:
-        """Stiffnesses, "alpha", length and axes of the cell, rotary inertia."""
+        """Length and axes of the cell, rotary inertia."""
         inertia = [f"J{i}{j}" for i in range(3) for j in range(3)] * bool(self.rates)
-        return [
-            *STIFFNESS_IN_SPACE, *["alpha"] * bool(self.scheme.alpha), "h",
-            *(f"R{i}{j}" for i in range(3) for j in range(3)), *inertia,
-        ]  # fmt: skip
+        return ["h", *(f"R{i}{j}" for i in range(3) for j in range(3)), *inertia]
+
+    @abstractmethod
+    def response(
+        self, at: Inputs, e0: Vector, e1: Vector, predicted: Vector
+    ) -> tuple[list[Expr], dict[str, Any]]:
+        """Return the resultants of strains as intermediate numbers, and further equations.
+
+        The strains are those before the step, at its end and, in statics, predicted ones.
+        """
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
@@ -118,25 +124,8 @@ class ElasticCellInSpace(InertiaInSpace):
             tuple(map(at.stage, _strains(middle, slope, axes, h)))
             for middle, slope in zip((old, now), slopes, strict=True)
         )
-        C = [at[name] for name in STIFFNESS_IN_SPACE]
-        own, predicted = self._resultants(at, C, e0, e1), [None] * 6
-        if not self.rates:
-            predicted = self._resultants(at, C, e0, self._predicted(at, q0, u[0], axes))
-        growth = [now - before for before, now in zip(e0, e1, strict=True)]
-        state, lost = new_state(turns), dict[str, Expr]()
-        if self.scheme.alpha:
-            work = sum(C[i] * growth[i] ** 2 for i in range(6))
-            lost["numerical"] = at["alpha"] * h * work
-        if self.scheme.lost_fraction:  # see SecondDifferences of damping.py
-            *before, last_dt = (at[name] for name in LAST_CHANGES)
-            ratio = ufl.conditional(ufl.lt(at["dt"], last_dt), at["dt"] / last_dt, 1.0)
-            triples = zip(C, growth, before, strict=True)
-            f = ufl.as_ufl(self.scheme.lost_fraction)
-            damping = [f * c * (x - ratio * y) for c, x, y in triples]
-            own = [x + y for x, y in zip(own, damping, strict=True)]
-            lost["numerical"] = h * sum(x * y for x, y in zip(damping, growth, strict=True))
-            state |= zip(LAST_CHANGES, [*growth, at["dt"]], strict=True)
-        r = [at.stage(x, in_tangent=y) for x, y in zip(own, predicted, strict=True)]
+        predicted = self._predicted(at, q0, u[0], axes) if "moved" in self.modes else ()
+        r, more = self.response(at, e0, e1, predicted)
         pair, tangents = turns, [add(transposed_times(axes, FIRST), slope) for slope in slopes]
         if at_end:
             old, tangents, pair = now, [tangents[1]] * 2, [turn.at_end for turn in turns]
@@ -149,16 +138,8 @@ class ElasticCellInSpace(InertiaInSpace):
             on_nodes = [add(x, y) for x, y in zip(on_nodes, turning, strict=True)]
         forces = [x for i in range(3) for x in (-N[i], N[i])]
         forces += [x for both in zip(*on_nodes, strict=True) for x in both]
-        stored = h / 2 * sum(C[i] * e1[i] ** 2 for i in range(6))
-        return Equations(forces, state, {"stored": stored}, lost)
-
-    def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
-        found = list[Expr]()
-        for some in (slice(0, 3), slice(3, 6)):
-            c, before, now = (ufl.as_vector(x[some]) for x in (C, e0, e1))
-            r = self.scheme.resultants(c, before, now, lambda _: at["alpha"])
-            found += [r[k] for k in range(3)]
-        return found
+        state = new_state(turns) | more.pop("state", {})
+        return Equations(forces, state, **more)
 
     def _predicted(
         self, at: Inputs, q0: Sequence[Vector], u0: Sequence[Vector], axes: Any
@@ -190,6 +171,101 @@ class ElasticCellInSpace(InertiaInSpace):
         return found
 
 
+@dataclass(frozen=True)
+class ElasticCellInSpace(CellInSpace):
+    """Cell whose resultants are linear in its strains."""
+
+    @property
+    def numbers(self) -> list[str]:
+        """Stiffnesses, "alpha", and those of the base class."""
+        return [*STIFFNESS_IN_SPACE, *["alpha"] * bool(self.scheme.alpha), *super().numbers]
+
+    @property
+    def state(self) -> list[str]:
+        """Quaternions of the nodes; changes of strains in the last step, and its length (s)."""
+        return [*super().state, *LAST_CHANGES * bool(self.scheme.lost_fraction)]
+
+    def response(
+        self, at: Inputs, e0: Vector, e1: Vector, predicted: Vector
+    ) -> tuple[list[Expr], dict[str, Any]]:
+        """See the base class."""
+        C, h = [at[name] for name in STIFFNESS_IN_SPACE], at["h"]
+        own, others = self._resultants(at, C, e0, e1), [None] * 6
+        if predicted:
+            others = self._resultants(at, C, e0, predicted)
+        growth, state, lost = subtract(e1, e0), dict[str, Expr](), dict[str, Expr]()
+        if self.scheme.alpha:
+            work = sum(C[i] * growth[i] ** 2 for i in range(6))
+            lost["numerical"] = at["alpha"] * h * work
+        if self.scheme.lost_fraction:  # see SecondDifferences of damping.py
+            *before, last_dt = (at[name] for name in LAST_CHANGES)
+            ratio = ufl.conditional(ufl.lt(at["dt"], last_dt), at["dt"] / last_dt, 1.0)
+            triples = zip(C, growth, before, strict=True)
+            f = ufl.as_ufl(self.scheme.lost_fraction)
+            damping = [f * c * (x - ratio * y) for c, x, y in triples]
+            own = [x + y for x, y in zip(own, damping, strict=True)]
+            lost["numerical"] = h * sum(x * y for x, y in zip(damping, growth, strict=True))
+            state |= zip(LAST_CHANGES, [*growth, at["dt"]], strict=True)
+        r = [at.stage(x, in_tangent=y) for x, y in zip(own, others, strict=True)]
+        stored = h / 2 * sum(C[i] * e1[i] ** 2 for i in range(6))
+        return r, {"state": state, "stored": {"stored": stored}, "lost": lost}
+
+    def _resultants(self, at: Inputs, C: Sequence[Expr], e0: Vector, e1: Vector) -> list[Expr]:
+        found = list[Expr]()
+        for some in (slice(0, 3), slice(3, 6)):
+            c, before, now = (ufl.as_vector(x[some]) for x in (C, e0, e1))
+            r = self.scheme.resultants(c, before, now, lambda _: at["alpha"])
+            found += [r[k] for k in range(3)]
+        return found
+
+
+@dataclass(frozen=True)
+class InelasticCellInSpace(CellInSpace):
+    """Cell with material points, see :class:`~ufl_beam.blocks.beams.InelasticCell`."""
+
+    @property
+    def modes(self) -> list[str]:
+        """Resultants and their derivatives; in statics also predicted resultants."""
+        names = {"predicted": 0 if self.rates else 6, "r": 6, "D": 36}
+        return [*super().modes, *(f"{x} {k}" for x, n in names.items() for k in range(n))]
+
+    def response(
+        self, at: Inputs, e0: Vector, e1: Vector, predicted: Vector
+    ) -> tuple[list[Expr], dict[str, Any]]:
+        """See the base class."""
+        r = [
+            at.stage(
+                at[f"r {k}"], sum(at[f"D {6 * k + l}"] * e1[l] for l in range(6)),
+                in_tangent=at.get(f"predicted {k}"),
+            )
+            for k in range(6)
+        ]  # fmt: skip
+        return r, {"strains": e1, "predicted": predicted}
+
+
+@dataclass(frozen=True)
+class ViscousCellInSpace(CellInSpace):
+    """Cell whose resultants are in proportion to strain rates, besides those of other laws."""
+
+    rates = 0
+    modes = ()
+    of_step = ("dt",)
+
+    @property
+    def numbers(self) -> list[str]:
+        """Retardation time (s), stiffnesses, and those of the base class."""
+        return ["time", *STIFFNESS_IN_SPACE, *super().numbers]
+
+    def response(
+        self, at: Inputs, e0: Vector, e1: Vector, predicted: Vector
+    ) -> tuple[list[Expr], dict[str, Any]]:
+        """See the base class."""
+        growth, factor = subtract(e1, e0), at["time"] / at["dt"]
+        own = zip(STIFFNESS_IN_SPACE, growth, strict=True)
+        r = tuple(at.stage(factor * at[name] * x) for name, x in own)
+        return [*r], {"lost": {"damping": at["h"] * dot(r, growth)}}
+
+
 def _same(x: Expr) -> Expr:
     return x
 
@@ -209,41 +285,35 @@ def _strains(middle: Middle, slope: Vector, axes: Any, h: Expr) -> Vector:
     return (*times(axes, add(moved, turned)), *times(axes, curvature))
 
 
-class CellsInSpace(Block):
+class CellsInSpace(BeamCells):
     """Elastic cells of beams in space."""
 
     def __init__(self, fields: Fields, setting: BlockSetting) -> None:
         scheme, n = setting.scheme, len(fields.order)
         numbers = [*fields.section_values(*STIFFNESS_IN_SPACE).T]
         numbers += [np.full(n, scheme.alpha)] * bool(scheme.alpha)
-        lengths, axes = cell_axes(fields)
-        numbers += [lengths, *axes.transpose(2, 1, 0).reshape(9, n)]
-        if has_inertia(scheme):
-            numbers += [*rotary_inertia(fields, axes).reshape(n, 9).T]
-        cells = fields.subdomain.cells[fields.order]
-        elements = Elements(
-            "cells in space", cells, fields.cell_dofs, numbers, cells=fields.order,
-            force_kind=lib.STRESS,
-        )  # fmt: skip
-        super().__init__(ElasticCellInSpace(alike(scheme)), elements, setting, kind="beams")
-        self.in_cells, self.prediction = [], None
+        numbers += _geometry(fields, scheme)
+        statement: Any = ElasticCellInSpace(alike(scheme))
+        super().__init__(statement, "cells in space", fields, setting, [], numbers)
+        self.in_cells = []
         self.forget_last_step()
-        if not has_inertia(scheme):
-            self.prediction = struct("predicted_forces")
-            fill(self._c, predicted=self.prediction)
-            self.loops = self.loops[0], loop("add_predicted_tangent", self._c)
 
     def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
         """Return the places in the states of the quaternions of vertices, and the vertices."""
-        cell, second = of_vertices(numbering).T[:, :, None]
-        own = np.searchsorted(self._elements.indices, cell)
-        row = own // BATCH * len(self.statement.state) + 4 * second + np.arange(4)
-        return np.asarray(row * BATCH + own % BATCH), np.arange(len(row))
+        cells = self._elements.indices
+        cell, second = of_vertices(numbering, cells).T
+        own, vertices = np.searchsorted(cells, cell), np.unique(numbering.cells[cells])
+        row = own // BATCH * len(self.statement.state) + 4 * second
+        return (row[:, None] + np.arange(4)) * BATCH + own[:, None] % BATCH, vertices
 
     @property
     def states(self) -> Array:
         """States of all cells, in batches."""
         return self._states
+
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
+        """See the base class: quaternions."""
+        Block.save_or_restore(self, archive, q)
 
     def forget_last_step(self) -> None:
         """Let the next step not depend on changes of strains in the last one."""
@@ -257,9 +327,60 @@ class CellsInSpace(Block):
         if not archive.restores or archive.has(f"{self._elements.name}, {len(LAST_CHANGES)}"):
             super().keep_states(archive, quaternions)
 
-    def phases(self, callbacks: Callbacks) -> Phases:
+
+class InelasticCellsInSpace(InelasticCells):
+    """Cells of beams in space with material points."""
+
+    states = CellsInSpace.states
+
+    def __init__(self, fields: Fields, section_points: SectionPoints, *others: Any) -> None:
+        super().__init__(fields, section_points, *others)
+        self.in_cells, self._known, self._first = [], False, section_points.number == 0
+
+    def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
+        """See :class:`CellsInSpace`; only the first points of cells give the quaternions."""
+        at, vertices = CellsInSpace.turns(self, numbering)  # type: ignore[arg-type]
+        return at[: len(at) * self._first], vertices[: len(at) * self._first]
+
+    def start(self, q: Array) -> None:
+        """See the base class; strains of a restored state keep their last bits."""
+        if not self._known:
+            super().start(q)
+
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """See the base class."""
-        return super().phases(callbacks)._replace(change=loop("change_of_cells", self._c))
+        super().save_or_restore(archive, q)
+        self._known = archive.restores
+
+    @staticmethod
+    def stated(
+        fields: Fields, scheme: Scheme, strains: Sequence[ImposedStrain], number: int
+    ) -> tuple[Any, list[Array]]:
+        """See the base class; the first points of a cell are with its rotary inertia."""
+        return InelasticCellInSpace(alike(scheme)), _geometry(fields, scheme, float(number == 0))
+
+
+def viscosity_in_space(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:
+    """Return the block of a viscosity, which has its own copies of quaternions."""
+    some = viscous_cells(damping, fields)
+    stiffness = some.section_values(*STIFFNESS_IN_SPACE).T
+    numbers = [np.full(len(some.order), damping.retardation_time), *stiffness]
+    elements = Elements(
+        "viscosity", some.subdomain.cells[some.order], some.cell_dofs,
+        [*numbers, *_geometry(some)], cells=some.order, force_kind=lib.STRESS,
+    )  # fmt: skip
+    block = Block(ViscousCellInSpace(setting.scheme), elements, setting, kind="damping")
+    block.in_cells = []
+    return block
+
+
+def _geometry(fields: Fields, scheme: Scheme | None = None, inertia: float = 1.0) -> list[Array]:
+    """Return lengths, axes and, in dynamics, rotary inertia times a factor of cells."""
+    lengths, axes = cell_axes(fields)
+    numbers = [lengths, *axes.transpose(2, 1, 0).reshape(9, -1)]
+    if scheme is not None and has_inertia(scheme):
+        numbers += [*inertia * rotary_inertia(fields, axes).reshape(-1, 9).T]
+    return numbers
 
 
 def turned_momentum(m: Vector, P: Vector, dt: Expr) -> Vector:

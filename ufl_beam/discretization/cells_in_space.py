@@ -193,9 +193,7 @@ def _rotations(turns: Array) -> Rotation:
     return Rotation.from_quat(np.roll(turns + np.eye(4)[0], -1, axis=1))
 
 
-def of_vertices(numbering: DofNumbering) -> Index:
-    """Return a cell of each vertex, and whether the vertex is its first or second; (n, 2)."""
-    flat, found = numbering.cells.ravel(), np.zeros((len(numbering.points), 2), dtype=np.int64)
-    vertices, first = np.unique(flat, return_index=True)
-    found[vertices] = np.column_stack([first // 2, first % 2])
-    return found
+def of_vertices(numbering: DofNumbering, cells: Index) -> Index:
+    """Return a cell of each vertex of some cells, and whether it is its first or second; (n, 2)."""
+    _, first = np.unique(numbering.cells[cells].ravel(), return_index=True)
+    return np.column_stack([cells[first // 2], first % 2])

@@ -271,7 +271,7 @@ class DofNumbering:
         groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
-            points = section.section_points(section.hinge)
+            points = section.section_points(section.hinge, self.scene.in_space)
             if not all(class_points.elastic for class_points in points):
                 for class_points in points:
                     groups.setdefault(class_points, []).append(number)

@@ -19,9 +19,10 @@ from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.sections import IN_SPACE
 
 STIFFNESS: dict[int, tuple[str, ...]] = {
-    2: ("EA", "GA", "EI"), 3: ("EA", "GA", "GA3", "GJ", "EI2", "EI"),
+    2: ("EA", "GA", "EI"), 3: tuple(IN_SPACE.values()),
 }  # fmt: skip
 """Stiffnesses of sections in the plane, and for axes 1, 2, 3 of strains and curvatures in space."""
 

@@ -44,6 +44,7 @@ class Transfer:
 
     def __init__(self, old: DofNumbering, new: DofNumbering) -> None:
         self._old, self._new = old, new
+        new.scene.require_plane("start= of a scene with other connections")
         self._require_alike()
         bodies = [body for body in new.scene.rigid_bodies if body in old.scene.rigid_bodies]
         new_dofs, old_dofs = (

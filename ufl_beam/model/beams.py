@@ -52,7 +52,8 @@ class Beam(Record, Member):
             ``{0.0: Softening(limit, fracture_energy)}``.  A law is a :class:`SofteningLaw` or
             :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  A hinge is
             rigid until its moment reaches the limit of the law.  At an end of the beam, the law
-            replaces ``Section(hinge=)``, and ``None`` removes the hinge of the section.
+            replaces ``Section(hinge=)``, and ``None`` removes the hinge of the section.  In space
+            hinges are about axis 3 of the section.
         up: In space, a vector in the plane of the axes 1 and 2 of the section: axis 1 is along the
             beam, axis 2 is the part of ``up`` across it, and axis 3 is normal to both.  By default
             ``(0, 0, 1)``.
@@ -164,6 +165,13 @@ class Beam(Record, Member):
             raise ModelError(
                 f"{self.name}: hinges are for resultants; fibres break by Fibres(softening=)"
             )
+
+    def third_axis(self, s: float) -> Point:
+        """Return axis 3 of the section at a place in space, for the chord of a cell about it."""
+        ends = (max(s - 0.5 / self.cells, 0.0), min(s + 0.5 / self.cells, 1.0))
+        a, b = (np.array(self.curve(x)) for x in ends)
+        normal = np.cross(b - a, np.array(self.up))
+        return tuple((normal / np.linalg.norm(normal)).tolist())
 
     def _label(self) -> str:
         return self.name

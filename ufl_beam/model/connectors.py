@@ -27,7 +27,7 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_kind, require_point
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
-from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic, Spring
+from ufl_beam.model.connector_laws import RIGID, HingeLaw, Law, RigidPlastic, Spring
 from ufl_beam.model.functions import Point, TimeFunction
 from ufl_beam.model.records import Record, Text, Vector
 
@@ -173,7 +173,7 @@ class Turn(Connector):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     In space, the motion is the component of the rotation vector along an ``axis`` that is fixed in
-    both places, up to 180 degrees.
+    both places, below 360 degrees.
 
     Example:
         >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad
@@ -401,6 +401,9 @@ def plastic_hinges(
     of such a hinge could bear this moment, so the load acts on the beam.  If a joint connects two
     beams and no other part at it bears a moment, both beams bear the same moment.  Then the hinge
     of the stronger beam is left out if the moment of the weaker hinge never exceeds its limit.
+
+    In space a hinge is about axis 3 of the section, and connectors before the hinges hold the other
+    rotations.  No hinge is left out for a weaker one, whose axis may be another one.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:
@@ -420,13 +423,19 @@ def plastic_hinges(
         between = len(others) > 0 and (dof in acted or not _never_opens(place, others, laws))
         return dof in borne or between
 
-    hinges = []
+    hinges, holders = list[Connector](), list[Connector]()
     for place, law in laws.items():
         if stays(place):
             beyond = Place(place.beam, place.s, beyond=True)
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-            hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law)))
-    return tuple(hinges)
+            axis = Component.axis if len(place.point) == 2 else place.beam.third_axis(place.s)
+            hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law), axis))
+            normals: Sequence[Point] = across(axis) if len(axis) == 3 else ()
+            holders += [
+                Component("Hinge", "aligning", before, after, RIGID, normal, other=axis)
+                for normal in normals
+            ]
+    return (*holders, *hinges)
 
 
 def can_yield(connector: Connector) -> bool:
@@ -460,6 +469,8 @@ def _never_opens(place: Place, others: Sequence[Node], laws: Mapping[Place, Hing
     Of two bounded laws with the same limit, the first in ``laws`` counts as the weaker one.
     """
     if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
+        return False
+    if len(place.point) == 3:
         return False
     own, next_law, order = laws[place], laws[others[0]], list(laws)
     if own.limit == next_law.limit and own.bounded and next_law.bounded:

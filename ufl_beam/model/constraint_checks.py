@@ -433,7 +433,7 @@ def warn_of_held_motions(scene: Scene) -> None:
 def parts_that_switch(scene: Scene) -> Iterator[tuple[str, str]]:
     """Yield names of parts of a scene that may slide, touch, yield or break, with a reason."""
     for beam in scene.beams:
-        if beam.section.section_points(beam.section.hinge):
+        if beam.section.section_points(beam.section.hinge, scene.in_space):
             yield beam.name, "may yield or break"
     for connector in scene.all_connectors:
         law, name = connector.law, f"{type(connector.law).__name__} of {connector}"

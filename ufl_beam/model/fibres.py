@@ -42,11 +42,11 @@ class SectionPoints:
     the strains of the section.
     """
 
-    strains: Values  # derivatives of strains of points with respect to (Σ, Γ, K); (n, 3)
+    strains: Values  # derivatives by (Σ, Γ, K), (n, 3), or in space by six strains, (n, 6)
     weights: Values  # areas of fibres, or 1 for resultants; (n,), (1,) with interaction
     stiffness: Values  # elastic stiffness, also of each interacting resultant; (n,)
     laws: tuple[tuple[MaterialLaw, int], ...]  # (law, number of successive points)
-    rest: Values  # EA, GA, EI of resultants that have no points, otherwise 0; (3,)
+    rest: Values  # stiffnesses of resultants that have no points, otherwise 0; (3,), (6,)
     softening: SofteningLaw | None = None  # law of hinge or cracks, if points can break
     breaking: slice = slice(None)  # points that can break
     hinges: bool = False  # True if the breaking point is a hinge, with a jump of rotation
@@ -124,7 +124,7 @@ def by_class(points: Sequence[SectionPoints], rest: Array) -> tuple[SectionPoint
                 for name in ("strains", "weights", "stiffness", "at")
             },
             laws=tuple(law for p in group for law in p.laws),
-            rest=rest if number == 0 else np.zeros(3),
+            rest=rest if number == 0 else 0 * rest,
             softening=group[-1].softening,
             breaking=slice(sum(len(p.weights) for p in group if p.softening is None), None),
             hinges=group[-1].hinges,
@@ -175,6 +175,7 @@ class PlacedFibres:
     ends: tuple[float, float]  # least and largest y of the section as the user measures it; m
     bars: int = 0  # number of bars, which are the first fibres
     core: Shape | None = None  # shape of the core
+    z: Array | None = None  # in space, distances from the axis along axis 3; (n,); m
 
     def __repr__(self) -> str:
         return f"<{len(self.y)} fibres of {', '.join(type(f.law).__name__ for f in self.fibres)}>"
@@ -182,12 +183,14 @@ class PlacedFibres:
     @classmethod
     def about_centroid(
         cls, fibres: tuple[Fibres, ...], material: Index, E: Array, y: Array, A: Array,
-        ends: tuple[float, float] | None = None,
+        ends: tuple[float, float] | None = None, z: Array | None = None,
     ) -> PlacedFibres:  # fmt: skip
         """Create fibres at ``y`` (m), with the axis through the centroid of their stiffness EA."""
         axis = float((E * A) @ y / (E @ A))
         ends = ends or (float(y.min()), float(y.max()))
-        return cls(fibres, material, E, y - axis, A, axis, ends)
+        if z is not None:
+            z = z - (E * A) @ z / (E @ A)
+        return cls(fibres, material, E, y - axis, A, axis, ends, z=z)
 
     @classmethod
     def layers(
@@ -297,29 +300,31 @@ class PlacedFibres:
         """Bending stiffness; N m²."""
         return float(self.E * self.A @ self.y**2)
 
-    def section_points(self, GA: float) -> tuple[SectionPoints, ...]:
-        """Return one material point for each fibre, with the elastic shear stiffness ``GA`` (N).
+    def section_points(self, *elastic: float) -> tuple[SectionPoints, ...]:
+        """Return one material point for each fibre, with elastic stiffnesses besides.
 
-        The result for the latest ``GA`` is kept.
+        They are GA (N), or in space GA, GA3 (N) and GJ (N m²).  The latest result is kept.
         """
-        if (known := vars(self).get("_latest")) is not None and known[0] == GA:
+        if (known := vars(self).get("_latest")) is not None and known[0] == elastic:
             return known[1]  # type: ignore[no-any-return]
-        points = []
+        points, others = [], np.zeros((len(self.y), len(elastic)))
+        across = [] if len(elastic) == 1 else [np.asarray(self.z)]
+        strains = np.column_stack([np.ones(len(self.y)), others, *across, -self.y])
         for number, (law, softening) in enumerate((f.law, f.softening) for f in self.fibres):
             at = np.flatnonzero(self.material == number)
             points.append(
                 SectionPoints(
-                    strains=np.column_stack([np.ones(len(at)), np.zeros(len(at)), -self.y[at]]),
+                    strains=strains[at],
                     weights=self.A[at],
                     stiffness=self.E[at],
                     laws=((law, len(at)),),
-                    rest=np.zeros(3),
+                    rest=np.zeros(strains.shape[1]),
                     softening=softening if softening is not None and softening.opens else None,
                     at=at,
                 )
             )
-        made = by_class(points, np.array([0.0, GA, 0.0]))
-        object.__setattr__(self, "_latest", (GA, made))
+        made = by_class(points, np.array([0.0, *elastic, *[0.0] * len(across), 0.0]))
+        object.__setattr__(self, "_latest", (elastic, made))
         return made
 
 

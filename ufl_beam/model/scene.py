@@ -58,6 +58,7 @@ from ufl_beam.model.loads import (
     Damping,
     FollowerLoad,
     Gravity,
+    KelvinVoigt,
     LineLoad,
     Load,
     LoadAtPlace,
@@ -250,12 +251,13 @@ class Scene(Record, Rich):
         connectors += [c for x in self.connectors for c in x.components or (x,)]
         connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
+        d = 3 if self.in_space else 2
         bearing = [support.place for support in self.supports if support.bears_moment]
         bearing += [mass.place for mass in self.masses if mass.inertia]
         for connector in connectors if laws else ():
             by_a, by_b = connector.rigidly()
-            bearing += [connector.a] * bool(by_a[2] or connector.follows_a)
-            bearing += [connector.b] * bool(by_b[2])
+            bearing += [connector.a] * bool(any(by_a[d:]) or connector.follows_a)
+            bearing += [connector.b] * any(by_b[d:])
         loaded = [load.place for load in self.moments]
         rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
         return (*connectors, *plastic_hinges(laws, rigid, bearing, loaded))
@@ -272,7 +274,7 @@ class Scene(Record, Rich):
     @property
     def moments(self) -> list[LoadAtPlace]:
         """Loads with a moment at a place."""
-        return [load for load in self.loads if isinstance(load, LoadAtPlace) and load.moment]
+        return [x for x in self.loads if isinstance(x, LoadAtPlace) and np.any(x.moment)]
 
     @cached_property
     def rigid_bodies(self) -> tuple[Body, ...]:
@@ -410,6 +412,7 @@ IN_SPACE = (
     Beam, Body, Rigid, Revolute, Spherical, Universal, Prismatic, Cylindrical, RigidLink, Link,
     Turn, Stretch, Slide, Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, FollowerLoad,
     LineLoad, Pressure, MovingLoad, Gravity, RotatingFrame, Velocity,
+    KelvinVoigt,
 )  # fmt: skip
 """Classes of the objects of scenes in space."""
 
@@ -426,11 +429,6 @@ def require_space(scene: Scene) -> None:
             )
         if isinstance(record, MovingLoad) and record.mass:
             raise ModelError(f"{record}: masses that move along beams are for scenes in the plane")
-        law = getattr(record, "law", None)
-        if isinstance(law, RigidPlastic):
-            raise ModelError(
-                f"{record._label()}: {type(law).__name__} is a law for scenes in the plane"
-            )
     for beam in scene.beams:
         section = beam.section
         names = "GA3", "EI2", "GJ", *(("rhoI2",) if section.rhoI else ())
@@ -446,10 +444,15 @@ def require_space(scene: Scene) -> None:
                 "space do not model this offset; make the section with centroid_only=True to "
                 "ignore it, or take a section whose shear centre is its centroid"
             )
-        if beam.hinges or section.section_points(section.hinge):
+        if section.interaction:
             raise ModelError(
-                f"{beam.name}: inelastic laws and hinges are for scenes in the plane; beams in "
-                "space are elastic"
+                f"{beam.name}: interaction of N and M is for scenes in the plane; beams in space "
+                "may have fibres, or laws axial, shear, shear3, twisting, bending2, bending, hinge"
+            )
+        if section.fibres and section.fibres.z is None:
+            raise ModelError(
+                f"{beam.name}: the fibres of its section have no z for bending about axis 2; use "
+                "Section.of_fibres(y, A, z=, torsion=)"
             )
 
 

@@ -44,7 +44,16 @@ def require_stiffness(value: float | None, what: str) -> None:
         require_number(value, what, positive=True)
 
 
-LAWS = {"axial", "shear", "bending", "hinge", "interaction"}
+RESULTANTS = {"axial": "EA", "shear": "GA", "bending": "EI"}
+"""Laws of the resultants in the plane, with their stiffnesses, in the order of the strains."""
+
+IN_SPACE = {
+    "axial": "EA", "shear": "GA", "shear3": "GA3", "twisting": "GJ", "bending2": "EI2",
+    "bending": "EI",
+}  # fmt: skip
+"""Laws of the resultants in space."""
+
+LAWS = {*IN_SPACE, "hinge", "interaction"}
 """Arguments of a section that are laws."""
 
 
@@ -70,8 +79,11 @@ class Section(Record):
         axial: Inelastic law of the axial force N; N.
         shear: Inelastic law of the shear force V; N.
         bending: Inelastic law of the bending moment M; N m.
+        shear3, twisting, bending2: In space, inelastic laws of the shear force along axis 3, the
+            torsional moment, and the bending moment about axis 2; N, N m, N m.
         hinge: Law of the hinge that opens in each cell where the moment reaches the limit of the
-            law; N m, J.  For hinges at chosen places see :class:`Beam`.
+            law; N m, J.  For hinges at chosen places see :class:`Beam`.  In space it is about axis
+            3, with a warning if a run ends with a jump above 90 degrees.
         fibres: Fibres with their positions, instead of laws of resultants and of the hinge.  They
             come from :meth:`of_fibres`, or from shapes such as :meth:`rectangle`.
         shape: Shape of a homogeneous section, with its area and moduli, such as ``shape.Wpl``.  It
@@ -110,6 +122,9 @@ class Section(Record):
     GJ: Annotated[float | None, require_stiffness] = None
     rhoI2: Annotated[float | None, require_stiffness] = None
     centroid_only: Switch = False
+    shear3: ResultantLaw = None
+    twisting: ResultantLaw = None
+    bending2: ResultantLaw = None
     massless_by_default: bool = field(init=False, repr=False)
 
     steel = Moved("ufl_beam.structures.steel")
@@ -126,7 +141,7 @@ class Section(Record):
             object.__setattr__(self, "rhoA", 0.0)
         if self.depth == 0.0:
             object.__setattr__(self, "depth", math.sqrt(12 * self.EI / self.EA))
-        laws = [n for n in ("axial", "shear", "bending", "hinge") if getattr(self, n) is not None]
+        laws = [n for n in (*IN_SPACE, "hinge") if getattr(self, n) is not None]
         if laws and self.fibres is not None:
             raise ModelError(
                 f"Section: a law {laws[0]} beside fibres; a section with fibres has an elastic "
@@ -139,33 +154,37 @@ class Section(Record):
             )
         self.section_points(self.hinge)  # raises an error if the laws cannot be combined
 
-    def section_points(self, hinge: SofteningLaw | None) -> tuple[SectionPoints, ...]:
+    def section_points(
+        self, hinge: SofteningLaw | None, in_space: bool = False
+    ) -> tuple[SectionPoints, ...]:
         """Return the material points of a cell with a hinge law, by class of their laws.
 
-        The result is empty if no resultant has a law.
+        The result is empty if no resultant has a law.  The hinge is about axis 3.
         """
+        names = IN_SPACE if in_space else RESULTANTS
         if self.fibres is not None:
-            return self.fibres.section_points(self.GA)
+            others = (self.GA, self.GA3, self.GJ) if in_space else (self.GA,)
+            return self.fibres.section_points(*others)
         if hinge is not None and not hinge.opens:
             hinge = None
-        resultants = self.axial, self.shear, self.bending
+        resultants = [getattr(self, name) for name in names]
         if all(law is None for law in (*resultants, self.interaction, hinge)):
             return ()
-        stiffness, bending = np.array([self.EA, self.GA, self.EI]), self.bending
+        stiffness = np.array([getattr(self, name) for name in names.values()], float)
+        axes = np.eye(len(names))
         if self.interaction is not None:
             if hinge is not None:
                 raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
             inelastic = np.array([name in self.interaction.resultants for name in "NVM"])
             chosen, laws = [inelastic], [self.interaction]
         else:
-            if hinge is not None and bending is None:
-                bending = ElastoPlastic(yield_limit=math.inf)
-            resultants = self.axial, self.shear, bending
+            if hinge is not None and self.bending is None:
+                resultants[-1] = ElastoPlastic(yield_limit=math.inf)
             inelastic = np.array([law is not None for law in resultants])
-            chosen = [row == 1.0 for row in np.eye(3)[inelastic]]
+            chosen = [row == 1.0 for row in axes[inelastic]]
             laws = [law for law in resultants if law is not None]
         points = [
-            SectionPoints(np.eye(3)[x], np.ones(1), stiffness[x], ((law, 1),), np.zeros(3), at=(k,))
+            SectionPoints(axes[x], np.ones(1), stiffness[x], ((law, 1),), 0 * stiffness, at=(k,))
             for k, (x, law) in enumerate(zip(chosen, laws, strict=True))
         ]
         if hinge is not None:
@@ -262,7 +281,8 @@ class Section(Record):
     def of_fibres(
         cls, y: Sequence[float], A: Sequence[float], *, E: float | Sequence[float], nu: float,
         fibres: Fibres | Sequence[Fibres], rho: float | Sequence[float] | None = None,
-        shear_factor: float = 5 / 6,
+        shear_factor: float = 5 / 6, z: Sequence[float] | None = None,
+        torsion: float | None = None, shear_factor3: float | None = None,
     ) -> Section:  # fmt: skip
         """Create a section of fibres with areas ``A`` (m²) at coordinates ``y`` (m).
 
@@ -273,9 +293,13 @@ class Section(Record):
         N and M are uncoupled in elastic fibres.  The mass acts at the axis.  GA is
         ``shear_factor EA / (2 (1 + nu))``.
 
+        In space, ``y`` and ``z`` (m) are coordinates along axes 2 and 3 of the section, which are
+        principal axes, ``torsion`` is the torsion constant, and ``shear_factor3`` that for GA3, by
+        default equal to ``shear_factor``, see :meth:`of_shape`.  Torsion and shear are elastic.
+
         Raises:
-            ModelError: The sequences differ in length, an area or modulus is not positive, or all
-                fibres lie at one y.
+            ModelError: The sequences differ in length, an area or modulus is not positive, all
+                fibres lie at one y or z, or the axes are no principal axes.
 
         Example:
             >>> timber, steel = (ub.Fibres(ub.ElastoPlastic(limit)) for limit in (30e6, 355e6))
@@ -309,12 +333,27 @@ class Section(Record):
         density = _each(0.0 if rho is None else rho, len(at), f"{what}: rho")
         if not (moduli > 0).all() or not (density >= 0).all():
             raise ModelError(f"{what}: E must be positive, and rho must not be negative")
-        placed = PlacedFibres.about_centroid(laws, material, moduli, at, areas)
-        mass = density * areas
+        if z is None and (torsion is not None or shear_factor3 is not None):
+            raise ModelError(f"{what}: torsion and shear_factor3 are for fibres in space; give z")
+        across = None if z is None else require_array(z, f"{what}: z")
+        if across is not None and across.shape != at.shape:
+            raise ModelError(f"{what}: {across.size} coordinates z of {len(at)} fibres")
+        placed = PlacedFibres.about_centroid(laws, material, moduli, at, areas, z=across)
+        mass, in_space = density * areas, dict[str, Any]()
         mean, total = placed.EA / float(areas.sum()), float(areas.sum())
+        if placed.z is not None:
+            (EI2, product) = (moduli * areas * placed.z) @ np.column_stack([placed.z, placed.y])
+            if not EI2 > 0.0 or abs(product) > 1e-6 * EI2:
+                raise ModelError(
+                    f"{what}: axes 2 and 3 must be principal axes with bending stiffnesses; the "
+                    f"sums of E A z² and E A y z are {EI2:.3g} and {product:.3g} N m²"
+                )
+            factor = shear_factor if shear_factor3 is None else shear_factor3
+            in_space = {"I2": EI2 / mean, "torsion": torsion, "shear_factor3": factor}
+            in_space |= {} if rho is None else {"rhoI2": mass @ placed.z**2}
         return cls._from_material(
             total, placed.EI / mean, mean, nu, None, shear_factor,
-            depth=float(np.ptp(at)), fibres=placed,
+            depth=float(np.ptp(at)), fibres=placed, **in_space,
             **({} if rho is None else {"rhoA": mass.sum(), "rhoI": mass @ placed.y**2}),
         )  # fmt: skip
 

@@ -16,7 +16,7 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector, can_yield, place_of
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.state_rows import HINGE, OWN_LAW_YIELDS, PLASTIC, Connection
+from ufl_beam.output.state_rows import HINGE, JUMP, OWN_LAW_YIELDS, PLASTIC, Connection
 from ufl_beam.output.states import States
 
 SAME_VALUE = 1e-9
@@ -117,7 +117,7 @@ def _of_cells(states: States, beam: Member) -> Iterator[HingeHistory]:
     places = [beam.at((1 - a) * s[i] + a * s[i + 1]) for i, a in zip(start, x, strict=True)]
     rows = np.searchsorted(numbering.inelastic_cells, cells)[:, None] * mesh.degree
     rows = (rows + np.arange(mesh.degree)).ravel()
-    jump, plastic, broken = (states.column("material")[:, rows, k] for k in (3, PLASTIC, HINGE))
+    jump, plastic, broken = (states.column("material")[:, rows, k] for k in (JUMP, PLASTIC, HINGE))
     if beam.section.fibres is not None:  # cracks are no rotations
         plastic, broken = plastic + broken, 0 * broken
     for i in np.flatnonzero(broken.any(axis=0)):

@@ -14,7 +14,8 @@ from ufl_beam.model.bodies import Member
 def in_beam(numbering: DofNumbering, state: State, beam: Member) -> dict[str, Array]:
     """Return the internal variables of a beam, see :meth:`Solution.variables`."""
     cells, section = numbering.cells_of(beam), beam.section
-    number = sum(len(points.weights) for points in section.section_points(section.hinge))
+    groups = section.section_points(section.hinge, numbering.scene.in_space)
+    number = sum(len(points.weights) for points in groups)
     found = {name: x[cells, :, :number] for name, x in _at_points(numbering, state).items()}
     found = {name: x for name, x in found.items() if not np.isnan(x).all()}
     if not found:

@@ -86,9 +86,9 @@ OWN_LAW_YIELDS = 1e-3
 Smaller losses may be errors of the trapezoidal rule."""
 
 
-JUMP, PLASTIC, HINGE = 3, 4, 5
-"""Indices of fields in the column "material": (N, V, M), jump, plastic, hinge of
-:class:`Material`."""
+JUMP, PLASTIC, HINGE = -3, -2, -1
+"""Indices of the last fields in the column "material": jump, plastic, hinge of :class:`Material`,
+after the resultants."""
 
 
 class Columns:
@@ -132,7 +132,8 @@ class Columns:
             "connectors": (len(scene.all_connectors), len(Connection._fields)),
             # `Points.recorded`, Gauss point after Gauss point of cells that can yield or break
             "material": (
-                len(numbering.inelastic_cells) * numbering.mesh.degree, int(lib.POINT_KEPT),
+                len(numbering.inelastic_cells) * numbering.mesh.degree,
+                numbering.width + int(lib.POINT_KEPT),
             ),
             **({TURNS: (nodes, 4)} if scene.in_space else {}),
             **dict.fromkeys(ledger, ()),  # J
@@ -271,7 +272,8 @@ class StateWriter:
             rows = at["material"].start + width * sections.ravel()
             first = width * np.arange(len(rows))
             self._add(self._place(term.points.recorded), first[:, None] + k, rows[:, None] + k)
-        for term in in_space:
+        hinges = [x for x in connector_terms if hasattr(x, "turns")] if in_space else []
+        for term in (*in_space, *hinges):
             mine, nodes = term.turns(numbering)
             rows = at[TURNS].start + 4 * nodes[:, None] + np.arange(4)
             self._add(self._place(term.states), mine, rows)

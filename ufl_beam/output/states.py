@@ -517,7 +517,7 @@ class States:
         along: Array = np.zeros((len(cells.lengths), 2, 3))
         for load, on_nodes in self.cells.loads_in_space:
             along += value_at(load.amplitude, t, load) * on_nodes
-        resultants = self.cells.fields.section_values(*STIFFNESS_IN_SPACE) * cells.strains()
+        resultants = self.forces_in_middle(n)
         return cells.section_forces(pieces, resultants, along, in_scene=in_scene)
 
     def _in_space(self, n: int) -> CellsOfState:
@@ -538,7 +538,7 @@ class States:
         if not self.scene.in_space:
             return np.asarray(self.cell_forces(n)[:, 0])
         stiffness = self.cells.fields.section_values(*STIFFNESS_IN_SPACE)
-        return np.asarray(stiffness * self.mean_strains(n))
+        return self.cells_of(n, stiffness * self.mean_strains(n))[:, :JUMP]
 
     def section_forces_at(self, place: Place) -> Array:
         """Return (N, V, M) of :meth:`diagram` at a place; (n+1, 3); N, N, N m.
@@ -639,23 +639,25 @@ class States:
     def _material(self, n: int, cells: Index | int) -> Material:
         if not len(self.numbering.inelastic_cells) and not self.scene.hinges:
             raise ArgumentError("material: no beam of the scene yields or breaks; give one a law")
-        chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
-        return Material(chosen[:3].T, *chosen[3:])
+        chosen = self.cells_of(n, self.forces_in_middle(n))[cells].T
+        return Material(chosen[:JUMP].T, *chosen[JUMP:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
         """Return "material" of all cells, in elastic cells ``forces`` and zeros; (num_cells, 6).
 
-        Forces are means over a cell; jumps and energies are sums over its integration points.
+        Forces are means over a cell; jumps and energies are sums over its integration points.  In
+        space there are six forces; (num_cells, 9).
         """
         at_points = self.points_of(n)
         everything: Array = at_points.sum(axis=1)
         inelastic = self.numbering.inelastic_cells
-        everything[:, :3] = forces
-        everything[inelastic, :3] = self.numbering.mesh.point_weights @ at_points[inelastic, :, :3]
+        everything[:, :JUMP] = forces
+        means = self.numbering.mesh.point_weights @ at_points[inelastic, :, :JUMP]
+        everything[inelastic, :JUMP] = means
         return everything
 
     def points_of(self, n: int) -> Array:
-        """Return "material" at Gauss points of all cells, or zeros; (num_cells, degree, 6)."""
+        """Return "material" at Gauss points of all cells, or zeros; (num_cells, degree, 6 or 9)."""
         rows, p = self._row("material", n), self.numbering.mesh.degree
         everything: Array = np.zeros((len(self.numbering.cells), p, rows.shape[1]))
         everything[self.numbering.inelastic_cells] = rows.reshape(-1, p, rows.shape[1])
@@ -666,7 +668,7 @@ class States:
 
         ``forces`` are section forces in the middle of the cell; of a yielding cell, forces of its
         law for the strains at the stored time.  If a plastic hinge is at the
-        place, ``forces[:, 2]`` is the moment of the hinge in each step, ``jump`` its rotation, and
+        place, ``forces[:, -1]`` is the moment of the hinge in each step, ``jump`` its rotation, and
         ``hinge`` its dissipated energy.
 
         Raises:
@@ -677,7 +679,7 @@ class States:
         forces, jump, plastic, energy = map(np.array, states)
         if hinge is not None:
             history = self.connector(hinge)
-            forces[:, 2], jump, energy = history.force, history.motion, history.dissipated
+            forces[:, -1], jump, energy = history.force, history.motion, history.dissipated
         return Material(forces, jump, plastic, energy)
 
     def damage(self, n: int = -1) -> tuple[Array, Array]:

@@ -242,16 +242,22 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
     connectors /= np.where(
         [connector.is_rotation for connector in scene.all_connectors], 1.0, scene.size
     )
-    # Strains in the small motion, at the Gauss points; 1, 1, 1/m
-    strains = np.zeros((len(numbering.cells), p, 3))
-    after, before = map(strains_of(equation.fields), ends)
-    strains[subdomain.cells] = ((after - before) / (2 * ε)).reshape(-1, p, 3)
+    # Strains in the small motion, at the Gauss points, in space of inelastic cells; 1, 1, 1/m
+    strains = np.zeros((len(numbering.cells), p, numbering.width))
+    if not scene.in_space:
+        after, before = map(strains_of(equation.fields), ends)
+        strains[subdomain.cells] = ((after - before) / (2 * ε)).reshape(-1, p, 3)
+    for beams in equation.inelastic if scene.in_space else ():
+        after, before = map(beams.strains, ends)
+        strains[beams.sections()[0], 0] = (after - before) / (2 * ε)
     # Works of the tangent, and of the elastic stiffness, there
     works = np.zeros((2, len(numbering.cells), p))
     for beams in equation.inelastic:
         cells = beams.sections()[0]
-        works[:, cells] += beams.points.works(strains[cells].reshape(-1, 3)).reshape(2, -1, p)
-    sizes = np.abs(strains / [scene.size, scene.size, 1.0]).max(axis=(1, 2), initial=0.0)
+        by_point = strains[cells].reshape(-1, numbering.width)
+        works[:, cells] += beams.points.works(by_point).reshape(2, -1, p)
+    lengths = np.repeat([scene.size, 1.0], [d := numbering.displacements, numbering.width - d])
+    sizes = np.abs(strains / lengths).max(axis=(1, 2), initial=0.0)
     sizes *= numbering.lengths(np.arange(len(numbering.cells)))
     now, elastic = works
     left_in_cells = np.divide(now, elastic, out=np.ones_like(now), where=elastic > 0).min(axis=1)
@@ -275,7 +281,8 @@ def _describe(
     phrases = []
     for words in numbering.worst(np.where(alike >= 1 / 2, alike, 0.0)):
         component, _, place = words.partition(" of ")
-        what = "rotation" if component == "psi" else f"displacement {component}"
+        what = "rotation" if component == "psi" else component
+        what = what if what.startswith("rotation") else f"displacement {component}"
         phrases.append(f"the {what} of {place}")
     if cells.stiff:
         return (
@@ -291,7 +298,7 @@ def _describe(
     laws = (
         law
         for section in sections
-        for points in section.section_points(None)
+        for points in section.section_points(None, numbering.scene.in_space)
         for law, _ in points.laws
     )
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
@@ -359,7 +366,7 @@ class LedgerWatch:
         self._numbering, self._tolerance = numbering, tolerance
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()
         for beam in numbering.scene.beams:
-            points = beam.section.section_points(beam.section.hinge)
+            points = beam.section.section_points(beam.section.hinge, numbering.scene.in_space)
             if not all(class_points.elastic for class_points in points):
                 laws += [law for class_points in points for law, _ in class_points.laws]
         springs = [

@@ -166,6 +166,7 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
         return solution
     scene, numbering = solution.scene, solution.numbering
     owners = [numbering.middle(int(cell)).beam.name for cell in numbering.inelastic_cells[:1]]
+    owners += ["a scene in space"] * scene.in_space
     owners += [str(c) for c in scene.all_connectors if remembers(c.law)]
     owners += [str(x) for x in scene.works if isinstance(x, Effect) and x.statement.state]
     if owners:

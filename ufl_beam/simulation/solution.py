@@ -49,7 +49,7 @@ from ufl_beam.output.serialization import (
     require_no_code,
     to_data,
 )
-from ufl_beam.output.state_rows import HINGE
+from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.output.states import NO_STATE, States
 from ufl_beam.parallel import active_comm, on_first
 
@@ -357,6 +357,7 @@ class Opened:
         shear: |V| at the stored time before ``first``, or at ``first`` if that time is the
             beginning of the run; (num_cells, degree); N.
         dissipated: Energy that hinges and cracks dissipated up to the end; (num_cells, degree); J.
+        turned: Largest jump of the rotation at stored times; (num_cells, degree); rad.
     """
 
     def __init__(self, states: States) -> None:
@@ -364,7 +365,7 @@ class Opened:
         numbering, p = states.numbering, states.numbering.mesh.degree
         shape = len(numbering.cells), p
         self.first = np.full(shape, -1)
-        self.shear, self.dissipated = np.zeros((2, *shape))
+        self.shear, self.dissipated, self.turned = np.zeros((3, *shape))
         if not len(states):
             return
         columns, row = states.row(-1)
@@ -374,7 +375,8 @@ class Opened:
         if not len(rows):
             return
         opened = numbering.inelastic_cells[rows // p], rows % p
-        dissipated, V = (states.column("material")[:, rows, k] for k in (HINGE, 1))
+        dissipated, V, jump = (states.column("material")[:, rows, k] for k in (HINGE, 1, JUMP))
+        self.turned[opened] = np.abs(jump).max(axis=0)
         self.first[opened] = first = (dissipated > 0).argmax(axis=0)
         # V is taken before the opening, because a sudden opening causes vibrations.
         n = np.where(first > 1, first - 1, first)
@@ -433,6 +435,15 @@ class Opened:
                     "not dissipate went to the rest of the scene. Use cells shorter than "
                     f"{length / ratio:.3g} m, or a fracture energy "
                     f"{ratio:.3g} times as large"
+                )
+            turned = self.turned[cells].max(axis=1)
+            if numbering.scene.in_space and (jump := turned.max()) > math.pi / 2:
+                warn(
+                    f"{beam.name}: the hinge in the cell at "
+                    f"s = {numbering.middle(int(cells[turned.argmax()])).s:.3g} turned "
+                    f"by {math.degrees(jump):.3g} degrees. Against torsion, and bending about axis "
+                    f"2, its cell is {(jump / 2 / math.sin(jump / 2)) ** 2:.3g} times too stiff "
+                    "there. Put the hinge between two nodes, Beam(hinges={s: law})"
                 )
         for member, number, error, place in self.hinges():
             if error > WARNED_SHIFT:

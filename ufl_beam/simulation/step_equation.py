@@ -20,7 +20,12 @@ from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
-from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space
+from ufl_beam.blocks.spatial_beams import (
+    CellsInSpace,
+    InelasticCellsInSpace,
+    bodies_in_space,
+    viscosity_in_space,
+)
 from ufl_beam.blocks.spatial_loads import LoadsInSpace, loads_in_space
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
@@ -70,6 +75,7 @@ class StepEquation:
         terms: All terms: ``inner``, with the internal forces of ``beams`` and ``connector_terms``,
             and ``others``.
         imposed: Terms of ``beams`` with imposed strains.
+        remembering: Terms with internal variables, in space also with rotations of nodes.
         weights: Weights of residuals: 1 for forces, 1 / (size of the scene) for moments, 0 for
             ghosts and for equations of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
@@ -106,9 +112,8 @@ class StepEquation:
             if len(indices):
                 elastic[indices] = False
                 subset = Fields(subdomain, indices)
-                self.inelastic.append(
-                    InelasticCells(subset, section_points, cells, in_blocks, strains)
-                )
+                kind = InelasticCellsInSpace if scene.in_space else InelasticCells
+                self.inelastic.append(kind(subset, section_points, cells, in_blocks, strains))
         self.beams: list[BeamCells] = [*self.inelastic]
         numbering = subdomain.numbering
         some_elastic = len(numbering.inelastic_cells) < len(numbering.cells)
@@ -126,10 +131,11 @@ class StepEquation:
         subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
         self.in_space, self.nodes_in_space = list[CellsInSpace](), list[Any]()
         if scene.in_space:
-            self.in_space = [CellsInSpace(fields, in_blocks)] if len(fields.order) else []
+            self.in_space = [CellsInSpace(subset, in_blocks)] if len(subset.order) else []
             self.loads += loads_in_space(in_blocks)
-            self.nodes_in_space += [*self.in_space, *bodies_in_space(in_blocks)]
-            others += self.nodes_in_space[len(self.in_space) :]
+            bodies = bodies_in_space(in_blocks)
+            self.nodes_in_space += [*self.inelastic, *self.in_space, *bodies]
+            others += bodies
         elif elastic.any():
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
@@ -143,13 +149,19 @@ class StepEquation:
             if inertia.loses_energy:
                 ledger.lost["numerical"] += 0.0
             others.append(inertia)
+        viscous = list[Block]()
         for damping in scene.damping:
             if isinstance(damping, Rayleigh):
                 others += rayleigh_forces(damping, fields, *setting, inertia)
                 if damping.tangent:
                     others += tangent_damping(damping, subset, self.inelastic, in_blocks)
+            elif scene.in_space:
+                viscous.append(viscosity_in_space(damping, fields, in_blocks))
             else:
                 others.append(viscosity(damping, fields, in_blocks))
+        others += viscous
+        own = [*self.nodes_in_space, *viscous] or self.inelastic
+        self.remembering: list[Any] = [*own, *self.connector_terms]
         self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
         self._predicting: list[Any] = [*self.beams, *self.in_space]
@@ -217,7 +229,7 @@ class StepEquation:
         archive = Archive(self.subdomain)
         prediction.save_or_restore(archive)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
+        for term in self.remembering:
             term.save_or_restore(archive, q)
         friction = any(
             has_friction(connector.law)
@@ -249,7 +261,7 @@ class StepEquation:
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
+        for term in self.remembering:
             term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
         for cells in () if same else self.in_space:
             cells.forget_last_step()

@@ -2,27 +2,32 @@
 /* Cells with material points, which compute the resultants; see InelasticCells of blocks/beams.py. */
 
 /* out = A x */
-static inline void multiply(const double *A, const double *x, double *out)
+static inline void multiply(int n, const double *A, const double *x, double *out)
 {
-  for (int i = 0; i < 3; ++i) out[i] = A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
+  for (int i = 0; i < n; ++i) {
+    double sum = A[n * i] * x[0];
+    for (int k = 1; k < n; ++k) sum += A[n * i + k] * x[k];
+    out[i] = sum;
+  }
 }
 
 /* Store the response as the latest tangent. */
 static void take_tangent(const inelastic *m)
 {
   const points *p = m->points;
-  memcpy(m->last_D, p->D, 9 * (size_t)p->cells * sizeof *p->D);
+  const int n = p->strains;
+  memcpy(m->last_D, p->D, n * n * (size_t)p->cells * sizeof *p->D);
   for (int c = 0; c < p->cells; ++c) {
-    double *b = m->last_b + 3 * c;
-    multiply(p->D + 9 * c, p->e1 + 3 * c, b);
-    for (int k = 0; k < 3; ++k) b[k] = p->r[3 * c + k] - b[k];
+    double *b = m->last_b + n * c;
+    multiply(n, p->D + n * n * c, p->e1 + n * c, b);
+    for (int k = 0; k < n; ++k) b[k] = p->r[n * c + k] - b[k];
   }
 }
 
 /* Strains of the sections of all cells, from a function of the block. */
 static void find_sections(const inelastic *m, const cells *function, const double *q, double *e)
 {
-  memset(e, 0, 3 * m->points->cells * sizeof *e);
+  memset(e, 0, m->points->strains * m->points->cells * sizeof *e);
   add_cells((void *)function, q, e);
 }
 
@@ -33,7 +38,7 @@ static void predict_strains(const inelastic *m, const double *q)
 {
   const element_block *b = m->block;
   const double ratio = m->ratio;
-  const int last = 3 * m->points->cells;
+  const int last = m->points->strains * m->points->cells;
   predicted_forces *p = b->predicted;
   p->stale = 0;
   if (!p->begins) {
@@ -60,17 +65,17 @@ static const double *predict_forces(const inelastic *m, const double *q)
   const points *p = m->points;
   const predicted_forces *now = m->block->predicted;
   double *f = m->forces;
-  const int stays = now->exact || p->search[STIFF];
+  const int n = p->strains, stays = now->exact || p->search[STIFF];
   if (stays && !now->begins) return p->r;
   if (now->begins && (stays || !p->line)) {
-    for (int c = 0; c < p->cells; ++c) memcpy(f + 3 * c, p->kept + POINT_KEPT * c, 3 * sizeof *f);
+    for (int c = 0; c < p->cells; ++c) memcpy(f + n * c, p->kept + (n + POINT_KEPT) * c, n * sizeof *f);
     return f;
   }
   if (now->begins) take_tangent(m);
   if (!p->line || now->stale) predict_strains(m, q);
   for (int c = 0; c < p->cells; ++c) {
-    multiply(m->last_D + 9 * c, m->e + 3 * c, f + 3 * c);
-    for (int k = 0; k < 3; ++k) f[3 * c + k] += m->last_b[3 * c + k];
+    multiply(n, m->last_D + n * n * c, m->e + n * c, f + n * c);
+    for (int k = 0; k < n; ++k) f[n * c + k] += m->last_b[n * c + k];
   }
   return f;
 }
@@ -101,13 +106,13 @@ void respond_at(const inelastic *m, const double *q)
     p->linear = m->e;
   }
   respond(p);
-  put_modes(m, m->at_r, 3, p->r);
+  put_modes(m, m->at_r, p->strains, p->r);
 }
 
 /* Write the tangents of the latest response into the modes of the cells. */
 void put_tangents(const inelastic *m)
 {
-  put_modes(m, m->at_D, 9, m->points->D);
+  put_modes(m, m->at_D, m->points->strains * m->points->strains, m->points->D);
 }
 
 void add_inelastic_force(void *self, const double *q, double *r)
@@ -124,7 +129,7 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   points *p = m->points;
   respond_at(m, q);
   put_tangents(m);
-  put_modes(m, m->at_predicted, 3, b->predicted ? predict_forces(m, q) : p->r);
+  put_modes(m, m->at_predicted, p->strains, b->predicted ? predict_forces(m, q) : p->r);
   add_cells((void *)b->inserted, q, tangent);
   if (b->predicted) {
     take_tangent(m);
@@ -144,8 +149,10 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
 {
   const inelastic *m = self;
   const double *unlike = m->points->unlike;
+  double largest = 0;
   respond_at(m, q);
-  const double largest = fmax(fmax(unlike[0], unlike[1]), unlike[2] / m->scene);
+  for (int k = 0, n = m->points->strains; k < n; ++k)
+    largest = fmax(largest, 2 * k < n ? unlike[k] : unlike[k] / m->scene); /* forces, then moments */
   return largest > 0 ? largest / scale : 0;
 }
 

@@ -187,7 +187,7 @@ enum point_output { WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELEASED, RELAXED,
 
 enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
-enum { POINT_KEPT = 6 }; /* numbers of a section in `kept`, see end_points */
+enum { POINT_KEPT = 3 }; /* numbers of a section in `kept` after the resultants, see end_points */
 
 extern const double NO_ENERGY; /* relative size below which dissipation counts as zero */
 
@@ -219,6 +219,7 @@ typedef struct {
   kernel *own; /* dissipation of a law that must not give energy, and its size; or none */
   int solves, components, variables, strain;
   int cells, of_cell, width;
+  int strains; /* of a section: 3, in space 6 */
   const double *B, *weight, *rest, *length;
   double theta;
   double *e0, *e1, *w, *r, *D, *kept, *sum;
@@ -229,7 +230,7 @@ typedef struct {
   double *line, *predicted;
   int predicts;
   const double *linear; /* strains of sections that a static iteration predicts; or none */
-  double *unlike; /* largest (N, V, M) by which a point's answer differs from the stress of its strain */
+  double *unlike; /* largest resultants by which a point's answer differs from the stress of its strain */
   /* Cells with tangent damping, whose first numbers are the derivatives D of the accepted state without negative
    * eigenvalues; or none. Number of sections in each. */
   const element_block *damped;

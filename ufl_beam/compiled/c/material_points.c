@@ -1,35 +1,38 @@
 /* SPDX-License-Identifier: MIT */
 /* Return map of material points in cross-sections, see material_points.py. */
 
-/* Strains of a point from the strains e of its section; b are its d rows of B. */
-static inline void find_strains(int d, const double *b, const double *e, double *strain)
+/* Strains of a point from the n strains e of its section; b are its d rows of B. */
+static inline void find_strains(int n, int d, const double *b, const double *e, double *strain)
 {
-  for (int a = 0; a < d; ++a)
-    strain[a] = b[3 * a] * e[0] + b[3 * a + 1] * e[1] + b[3 * a + 2] * e[2];
+  for (int a = 0; a < d; ++a) {
+    double sum = b[n * a] * e[0];
+    for (int k = 1; k < n; ++k) sum += b[n * a + k] * e[k];
+    strain[a] = sum;
+  }
 }
 
 /* Set the strains of the points w of a section from its strains e; the points do not open. */
-static inline void set_strains(const points *p, const double *e, double *w)
+static inline void set_strains(const points *p, int n, const double *e, double *w)
 {
   const int d = p->components;
   for (int i = 0; i < p->of_cell; ++i, w += p->width) {
-    if (d == 1) find_strains(1, p->B + 3 * i, e, w + p->strain);
-    else find_strains(d, p->B + 3 * d * i, e, w + p->strain);
+    if (d == 1) find_strains(n, 1, p->B + n * i, e, w + p->strain);
+    else find_strains(n, d, p->B + n * d * i, e, w + p->strain);
     w[GROWTH] = w[DIRECTION] = 0;
   }
 }
 
 /* Add stresses s of a point, and the derivatives that follow them in s, to the resultants of its
  * section. */
-static inline void add_answer(int d, const double *b, double weight, const double *s, double *r,
+static inline void add_answer(int n, int d, const double *b, double weight, const double *s, double *r,
                               double *D)
 {
   for (int a = 0; a < d; ++a)
-    for (int k = 0; k < 3; ++k) {
-      r[k] += weight * s[a] * b[3 * a + k];
+    for (int k = 0; k < n; ++k) {
+      r[k] += weight * s[a] * b[n * a + k];
       for (int g = 0; g < d; ++g)
-        for (int l = 0; l < 3; ++l)
-          D[3 * k + l] += weight * s[d + d * a + g] * b[3 * a + k] * b[3 * g + l];
+        for (int l = 0; l < n; ++l)
+          D[n * k + l] += weight * s[d + d * a + g] * b[n * a + k] * b[n * g + l];
     }
 }
 
@@ -99,25 +102,25 @@ static double follow_prediction(const points *p, double *w, double linear, const
  * If `search` has HOLD set, closed points stay closed for any stress. `over` is the largest
  * |stress| / limit - 1 of points beyond their limit, else zero.
  */
-void respond(points *p)
+static inline __attribute__((always_inline)) void respond_sized(points *p, const int n)
 {
   double s[3 + 9], *w = p->w, *r = p->r, *D = p->D, *line = p->line;
   const double *e0 = p->e0, *e1 = p->e1, *predicted = p->predicted;
   const int d = p->components, answers = d * (1 + d);
   *p->over = 0;
-  memset(p->unlike, 0, 3 * sizeof *p->unlike);
-  for (int c = 0; c < p->cells; ++c, e0 += 3, e1 += 3, r += 3, D += 9) {
-    memset(D, 0, 9 * sizeof *D);
-    for (int k = 0; k < 3; ++k) {
+  memset(p->unlike, 0, n * sizeof *p->unlike);
+  for (int c = 0; c < p->cells; ++c, e0 += n, e1 += n, r += n, D += n * n) {
+    memset(D, 0, n * n * sizeof *D);
+    for (int k = 0; k < n; ++k) {
       r[k] = p->rest[k] * ((1 - p->theta) * e0[k] + p->theta * e1[k]);
-      D[4 * k] = p->rest[k] * p->theta;
+      D[(n + 1) * k] = p->rest[k] * p->theta;
     }
     double *known = 0; /* answers that all points need */
     if (p->law_loop && p->linear && !p->predicts) {
-      set_strains(p, p->linear + 3 * c, w);
+      set_strains(p, n, p->linear + n * c, w);
       p->law_loop(p->of_cell, w, known = p->answers + answers * p->of_cell);
     }
-    set_strains(p, e1, w);
+    set_strains(p, n, e1, w);
     if (p->law_loop) p->law_loop(p->of_cell, w, p->answers);
     for (int i = 0; i < p->of_cell; ++i, w += p->width) {
       double *strain = w + p->strain;
@@ -135,21 +138,27 @@ void respond(points *p)
           s[d + a] = a % (d + 1) ? 0 : p->theta * strain[2 * d + a / (d + 1)];
       } else if ((p->predicts || p->linear) && !(w[TRACTION] < INFINITY)) {
         double linear = *strain;
-        if (p->linear) find_strains(1, p->B + 3 * i, p->linear + 3 * c, &linear);
+        if (p->linear) find_strains(n, 1, p->B + n * i, p->linear + n * c, &linear);
         const double *last = p->predicts ? predicted : 0, *there = known ? known + answers * i : 0;
         const double unlike = p->weight[i] * follow_prediction(p, w, linear, there, last, s);
-        for (int k = 0; k < 3 && unlike > 0; ++k)
-          p->unlike[k] = fmax(p->unlike[k], unlike * fabs(p->B[3 * i + k]));
+        for (int k = 0; k < n && unlike > 0; ++k)
+          p->unlike[k] = fmax(p->unlike[k], unlike * fabs(p->B[n * i + k]));
       }
       if (line) {
         line[0] = *strain, line[1] = s[0], line[2] = s[1];
         line += LINE, predicted += LINE;
       }
-      if (d == 1) add_answer(1, p->B + 3 * i, p->weight[i], s, r, D);
-      else add_answer(d, p->B + 3 * d * i, p->weight[i], s, r, D);
+      if (d == 1) add_answer(n, 1, p->B + n * i, p->weight[i], s, r, D);
+      else add_answer(n, d, p->B + n * d * i, p->weight[i], s, r, D);
     }
   }
   p->tried = 1;
+}
+
+void respond(points *p)
+{
+  if (p->strains == 3) respond_sized(p, 3); /* the compiler knows the size */
+  else respond_sized(p, 6);
 }
 
 /* Replace D by its symmetric part, and compute its eigenvalues A[k][k] and eigenvectors V[.][k],
@@ -239,7 +248,7 @@ static void add_committed(const points *p, double *inputs, const double *b, doub
   double s[3 + 9], r[3] = {0}, share = 1;
   at_end.tried = 0;
   if (!answer_at(&at_end, 1, inputs, s)) answer_at(&at_end, p->theta, inputs, s), share = 1 / p->theta;
-  add_answer(d, b, share * weight, s, r, D);
+  add_answer(3, d, b, share * weight, s, r, D);
   for (int i = 0; i < 3 * d; ++i) C[i % 3] += weight * inputs[p->strain + 2 * d + i / 3] * b[i] * b[i];
 }
 
@@ -261,18 +270,18 @@ void keep_tangents(const points *p)
 
 /* Energies of all points at the end of the step, see point_output. If `accepts`, the end becomes the new state.
  *
- * `kept` of a section has its resultants (3), the jump of its last point, and the dissipation by
- * plastic strains and by discontinuities.
+ * `kept` of a section has its resultants, the jump of its last point, and the dissipation by plastic
+ * strains and by discontinuities.
  */
 void end_points(points *p, double *sum, int accepts)
 {
   double own[POINT_OUTPUTS + POINT_INPUTS + MOST_VARIABLES + 3], *s = own, *w = p->w, *kept = p->kept;
-  const int d = p->components, states = POINT_INPUTS - TRACTION + p->variables, answers = POINT_OUTPUTS + states + d;
+  const int n = p->strains, d = p->components, states = POINT_INPUTS - TRACTION + p->variables, answers = POINT_OUTPUTS + states + d;
   memset(sum, 0, POINT_OUTPUTS * sizeof *sum);
-  for (int c = 0; c < p->cells; ++c, kept += POINT_KEPT) {
-    const double *e1 = p->e1 + 3 * c, length = p->length[c];
-    double *e0 = p->e0 + 3 * c, r[3], plastic = 0, broken = 0;
-    for (int k = 0; k < 3; ++k) {
+  for (int c = 0; c < p->cells; ++c, kept += n + POINT_KEPT) {
+    const double *e1 = p->e1 + n * c, length = p->length[c];
+    double *e0 = p->e0 + n * c, r[6], plastic = 0, broken = 0;
+    for (int k = 0; k < n; ++k) {
       const double rest = p->rest[k], change = e1[k] - e0[k];
       r[k] = rest * e1[k];
       sum[LOST] += rest * change * change / 2 * length;
@@ -287,7 +296,7 @@ void end_points(points *p, double *sum, int accepts)
       for (int k = 0; k < POINT_OUTPUTS; ++k) sum[k] += volume * s[k];
       plastic += volume * s[WORKED], broken += volume * s[BROKEN];
       for (int a = 0; a < d; ++a)
-        for (int k = 0; k < 3; ++k) r[k] += p->weight[i] * stress[a] * p->B[3 * (d * i + a) + k];
+        for (int k = 0; k < n; ++k) r[k] += p->weight[i] * stress[a] * p->B[n * (d * i + a) + k];
       if (!accepts) continue;
       double *strain = w + p->strain;
       memcpy(strain + d, strain, d * sizeof *w);
@@ -296,9 +305,9 @@ void end_points(points *p, double *sum, int accepts)
       w[GROWTH] = w[DIRECTION] = 0;
     }
     if (!accepts) continue;
-    memcpy(e0, e1, sizeof r);
-    memcpy(kept, r, sizeof r);
-    kept[3] = w[JUMP - p->width], kept[4] += plastic, kept[5] += broken;
+    memcpy(e0, e1, n * sizeof *e0);
+    memcpy(kept, r, n * sizeof *kept);
+    kept[n] = w[JUMP - p->width], kept[n + 1] += plastic, kept[n + 2] += broken;
   }
   if (accepts) p->tried = p->predicts = 0;
 }

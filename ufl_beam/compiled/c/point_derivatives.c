@@ -42,8 +42,8 @@ static void add_changed(const point_derivatives *m, const double *y, double *D, 
   double *inputs = p->inputs;
   for (int j = 0; j < m->of->block->width; ++j)
     if (m->column[j] >= 0) inputs[m->column[j]] = y[j];
-  find_strains(d, B, y, inputs + p->strain);
-  find_strains(d, B, y + 3, inputs + p->strain + d);
+  find_strains(3, d, B, y, inputs + p->strain);
+  find_strains(3, d, B, y + 3, inputs + p->strain + d);
   for (int k = 0; k < 3; ++k) D[4 * k] += rest[k], C[k] += rest[k];
   add_committed(p, inputs, B, B[3 * d], D, C);
 }
