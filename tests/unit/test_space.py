@@ -500,8 +500,10 @@ def refused():
     control = ub.LoadControl(0.1)
     return {
         "plot": lambda: ub.plot(run),
-        "buckling": lambda: ub.buckling(scene, 1),
-        "modes": lambda: ub.modes(scene, 1),
+        "response spectrum analysis": lambda: st.response_spectrum_analysis(scene, lambda T: 1.0),
+        "linearize": lambda: ub.linearize(
+            scene, inputs=[scene.supports[0]], outputs=[("displacement", BEAM.end)]
+        ),
         "follow": lambda: ub.follow(scene, control, steps=1),
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
         "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),

@@ -10,10 +10,14 @@ no rotations.  Quaternions of nodes are states of the elements.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+import numpy as np
 from ufl.core.expr import Expr
 
+from ufl_beam.arrays import Array
 from ufl_beam.blocks.statement import Inputs
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.mechanics.spatial_kinematics import Turn, Vector, product, subtract
 
 UNKNOWNS = "xyzabc"
@@ -37,6 +41,16 @@ def quaternion(at: Inputs, k: int) -> Vector:
     """Return the quaternion of a node before the step."""
     real, *others = (at[name] for name in quaternion_names(k))
     return (1.0 + real, *others)
+
+
+def put_turns(block: Any, turns: Array) -> None:
+    """Set the quaternions of the nodes of elements from those at rotations; (size, 4)."""
+    state = getattr(block, "state", {})
+    for k in range(block.statement.nodes if quaternion_names(0)[0] in state else 0):
+        column = block.statement.unknowns.index(f"a{k}")
+        values = in_batches(turns[np.asarray(block._elements.dofs)[:, column]], BATCH)
+        for i, name in enumerate(quaternion_names(k)):
+            state[name][:] = values[:, i]
 
 
 def vector(at: Inputs, group: str, names: str, k: int) -> Vector:

@@ -20,10 +20,12 @@ from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
+from ufl_beam.blocks.nodes_in_space import put_turns
 from ufl_beam.blocks.spatial_beams import CellsInSpace, bodies_in_space, dead_moments
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.cells_in_space import TURNS, by_rotation
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -59,7 +61,8 @@ class StepEquation:
         fields: Fields on the cells of this process.
         ledger: Energies of this process.
         controllers: Forces of controllers and limits of friction in the step.
-        beams: Terms of cells; ``inelastic``, the terms of cells with material points, come first.
+        beams: Terms of cells in the plane; ``inelastic``, those with material points, come first.
+        cells: Terms of all cells.
         connector_terms: Terms of connectors, grouped by kind.
         loads: Terms of loads and works.
         supports: Prescribed motions and reactions.
@@ -148,7 +151,7 @@ class StepEquation:
                 others.append(viscosity(damping, fields, in_blocks))
         self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
-        self._predicting: list[Any] = [*self.beams, *self.in_space]
+        self.cells: list[Any] = [*self.beams, *self.in_space]
         self.terms: list[Term] = [*self.inner, *self.others]
         self.imposed = [x for x in self.beams if x.imposed]
         self._fill_c(search, switched)
@@ -175,7 +178,7 @@ class StepEquation:
         product, cells = pop("add_step_tangent"), pop("add_cells")
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
-        predicted = [x.prediction for x in self._predicting if x.prediction is not None]
+        predicted = [x.prediction for x in self.cells if x.prediction is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -245,12 +248,17 @@ class StepEquation:
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
-        for term in (*self.inelastic, *self.nodes_in_space, *self.connector_terms):
+        in_space = () if TURNS in internal else self.nodes_in_space
+        for term in (*self.inelastic, *in_space, *self.connector_terms):
             term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
         unknown = archive.unknown.copy()
         for load in self.loads:
             if isinstance(load, Block) and load.remembers:
                 load.keep_states(archive)
+        if TURNS in internal:
+            turns = by_rotation(self.subdomain.numbering, internal[TURNS])[self.subdomain.dofs]
+            for term in (*self.nodes_in_space, *self.connector_terms, *self.loads):
+                put_turns(term, turns)
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
         if self.inertia is not None and same:
@@ -294,7 +302,7 @@ class StepEquation:
                     begin(data, c, ffi.NULL, ffi.NULL)
             for beams in imposed:
                 beams.impose(c)
-        for cells in self._predicting:
+        for cells in self.cells:
             if cells in some and (predicted := cells.prediction) is not None:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
@@ -305,9 +313,9 @@ class StepEquation:
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         step = Step.create(self.scheme, 0.0, short, short, q)
-        self.begin(step._replace(fraction=0.0), self.beams)  # imposed strains remain
-        for beam in self.beams:
-            beam.add_residual(q, forces)
+        self.begin(step._replace(fraction=0.0), self.cells)  # imposed strains remain
+        for cells in self.cells:
+            cells.add_residual(q, forces)
         if t is not None:
             step = Step.create(self.scheme, t, t + 1.0, t + 1.0, q)
             self.begin(step._replace(load_time=t, motion_time=t), self.connector_terms)
@@ -405,7 +413,7 @@ class StepEquation:
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
         for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
-            beam_work = sum(beams.tangent_work(q, x, y) for beams in self.beams)
+            beam_work = sum(cells.tangent_work(q, x, y) for cells in self.cells)
             works[i] = beam_work + times(x) @ y
         return works
 
@@ -418,8 +426,8 @@ class StepEquation:
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(column) for column in (X[:, i], Y[:, j]))
-            works[0, i, j] = sum(beams.tangent_work(q, x, y) for beams in self.beams)
-            works[1, i, j] = sum(beams.tangent_work(q, x, y, u) for beams in self.beams)
+            works[0, i, j] = sum(cells.tangent_work(q, x, y) for cells in self.cells)
+            works[1, i, j] = sum(cells.tangent_work(q, x, y, u) for cells in self.cells)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
             for term in (*self.connector_terms, *self.loads):

@@ -129,6 +129,7 @@ def pushover(
         beam.start (0, 0) opens
     """
     require_kind(scene, Scene, "pushover: scene")
+    scene.require_plane("pushover")
     require_kind(place, Place, "pushover: place")
     target = require_number(target, "pushover: target")
     if target == 0.0:

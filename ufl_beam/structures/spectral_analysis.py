@@ -207,6 +207,7 @@ def response_spectrum_analysis(
     """
     what = "response_spectrum_analysis"
     require_kind(scene, Scene, f"{what}: scene")
+    scene.require_plane(what)
     n = require_count(n, f"{what}: n")
     x, y = require_vector(direction, f"{what}: direction")
     if not (size := math.hypot(x, y)) > 0.0:
