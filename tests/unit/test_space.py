@@ -497,14 +497,12 @@ def refused():
     scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
     dynamic = {"scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 0.05, "progress": False}
     run = ub.simulate(scene, **dynamic)
-    control = ub.LoadControl(0.1)
     return {
         "plot": lambda: ub.plot(run),
         "response spectrum analysis": lambda: st.response_spectrum_analysis(scene, lambda T: 1.0),
         "linearize": lambda: ub.linearize(
             scene, inputs=[scene.supports[0]], outputs=[("displacement", BEAM.end)]
         ),
-        "follow": lambda: ub.follow(scene, control, steps=1),
         "Adaptive": lambda: ub.simulate(scene, **dynamic | {"dt": ub.Adaptive(1e-3)}),
         "Extremes": lambda: ub.simulate(scene, **dynamic, record=ub.Extremes()),
         "section forces": lambda: run.section_forces_at(BEAM.end),

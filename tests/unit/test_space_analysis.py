@@ -255,3 +255,222 @@ def test_a_pendulum_hangs_in_statics():
     weight = 9.81 * (shape[:-1] + shape[1:]) / 2  # of cells of 1 m and 1 kg
     assert abs(weight[:, 1].sum() + 0.1 * shape[-1, 2]) < 1e-9
     assert shape[-1, 1] > 0.01
+
+
+# -- paths -----------------------------------------------------------------------------------------
+
+
+def arch(at, flat):
+    """Half of a shallow arch, whose crown moves along y."""
+    up = {} if flat else {"up": at(0, 1)}
+    rod = ub.Section(EA=1e4, GA=1e4, EI=3.0, **{} if flat else OTHER)
+    half = ub.Beam(at(0, 0), at(2, 0.3), rod, cells=8, **up)
+    axis = {} if flat else {"axis": tuple(np.cross(at(1, 0), at(0, 1)))}
+    crown = ub.Prismatic(ub.ground(*at(2, 0)), half.end, axis=at(0, 1))
+    foot = ub.Revolute(ub.ground(*at(0, 0)), half.start, **axis)
+    down = ub.PointLoad(half.end, force=at(0, -10.0), amplitude=lambda t: t)
+    return ub.Scene([half], joints=[foot, crown], loads=[down])
+
+
+def test_planar_paths_in_a_turned_plane():
+    """Limit points of an arch that snaps through; states at equal load factors."""
+    both = []
+    for at in (in_plane, in_turned_plane):
+        scene = arch(at, at is in_plane)
+        path = ub.follow(scene, ub.ArcLength(0.02), steps=40)
+        at_load = ub.follow(scene, ub.LoadControl(0.1), steps=3)
+        tip = at_load.position(scene.beams[0].end)
+        both.append(([x.factor for x in path.critical if x.kind == "limit"], tip))
+    (limits, tips), (in_space, turned) = both
+    assert len(limits) == 2
+    assert np.abs(np.array(in_space) / limits - 1).max() < 1e-6
+    back = SKEW.inv().apply(turned)
+    assert np.abs(back - np.pad(tips, ((0, 0), (0, 1)))).max() < 1e-8
+
+
+def right_angle(cells, factor=1.0):
+    """Frame of a strip of 30 x 0.6 mm, 240 mm legs, under a force in its plane (N, mm)."""
+    E, G, w, h = 71240.0, 71240.0 / 2.62, 0.6, 30.0
+    strip = ub.Section(
+        EA=E * w * h, GA=G * w * h / 1.2, GA3=G * w * h / 1.2, EI=E * w * h**3 / 12,
+        EI2=E * h * w**3 / 12, GJ=G * h * w**3 / 3,
+    )  # fmt: skip
+    leg = ub.Beam((0, 0, 0), (240, 0, 0), strip, cells=cells, up=(0, 1, 0))
+    arm = ub.Beam((240, 0, 0), (240, -240, 0), strip, cells=cells, up=(1, 0, 0))
+    push = ub.PointLoad(arm.end, force=(factor, 0, 0), amplitude=lambda t: t)
+    return ub.Scene(
+        [leg, arm], joints=[ub.Rigid(leg.end, arm.start)], supports=[ub.Clamped(leg.start)],
+        loads=[push],
+    )  # fmt: skip
+
+
+def test_lateral_buckling_of_a_right_angle_frame():
+    """Path, buckling analysis and the published 1.088 N agree; the branch leaves the plane.
+
+    Simo and Vu-Quoc, Computer Methods in Applied Mechanics and Engineering 58 (1986).
+    """
+    scene = right_angle(20)
+    path = ub.follow(scene, ub.LoadControl(0.25), steps=5)
+    (point,) = path.critical
+    assert point.kind == "bifurcation"
+    assert abs(point.factor / 1.088 - 1) < 5e-4
+    factors = ub.buckling(scene, 2).factors
+    assert abs(factors.max() / point.factor - 1) < 1e-6
+    tip, out = scene.beams[1].end, []
+    for sign in (1, -1):
+        branch = ub.follow(scene, ub.ArcLength(0.05), start=point.branch(sign), steps=6)
+        assert (np.diff(branch.factor) > 0).all()
+        out.append(branch.displacement(tip)[:, 2])
+    assert np.abs(out[0] + out[1]).max() < 1e-6 * np.abs(out[0]).max()
+    assert abs(out[0][-1]) > 50.0
+
+
+def test_paths_continue():
+    """A path in two parts is the whole path; displacement control in space."""
+    scene = right_angle(4)
+    tip = scene.beams[1].end
+    scene = ub.Scene(
+        scene.beams, joints=scene.joints, supports=scene.supports,
+        loads=[*scene.loads, ub.PointLoad(tip, force=(0, 0, 0.02), amplitude=lambda t: t)],
+    )  # fmt: skip
+    whole, first = (
+        ub.follow(scene, ub.DisplacementControl(tip, "w", 10.0, end=end), steps=20)
+        for end in (60.0, 30.0)
+    )
+    control = ub.DisplacementControl(tip, "w", 10.0, end=60.0)
+    for start in (first, (whole, 4)):
+        second = ub.follow(scene, control, steps=20, start=start)
+        assert abs(second.displacement(tip)[-1, 2] - 60.0) < 1e-4
+        assert abs(second.factor[-1] / whole.factor[-1] - 1) < 1e-6
+    for component in ("psi", "x"):
+        with pytest.raises(ub.ArgumentError, match="must be one of u, v, w"):
+            ub.DisplacementControl(tip, component, 0.1)
+
+
+def test_a_ring_turned_twice_by_180_degrees():
+    """It has a third of its radius (Goto et al. 1992), and needs no moments there."""
+    R, E, b, h, ends = 20.0, 2.1e7, 1 / 3, 1.0, []
+    strip = ub.Section(
+        EA=E * b * h, GA=E * b * h / 2, GA3=E * b * h / 2, GJ=9.753e-3 * 8.0769e6,
+        EI2=E * h * b**3 / 12, EI=E * b * h**3 / 12,
+    )  # fmt: skip
+    axis = (1.0, 0, 0)
+    for cells in (20, 40):
+        half = ub.Beam.along(
+            lambda s: (R * np.cos(np.pi * s), R * np.sin(np.pi * s), 0.0), strip, cells=cells
+        )
+        places = (ub.ground(R, 0, 0), half.start), (ub.ground(-R, 0, 0), half.end)
+        turns = [
+            ub.Turn(*pair, ub.PrescribedMotion(lambda t, k=sign * np.pi: k * t), axis=axis)
+            for pair, sign in zip(places, (1, -1), strict=True)
+        ]
+        joints = [ub.Revolute(*places[0], axis=axis)]
+        joints.append(ub.Prismatic(*places[1], axis=axis, turning=True))
+        scene = ub.Scene([half], joints=joints, connectors=turns)
+        path = ub.follow(scene, ub.LoadControl(1 / 60), steps=60)
+        assert abs(path.factor[-1] - 1) < 1e-9
+        ends.append(np.linalg.norm(np.subtract(*(path.position(x)[-1] for _, x in places))))
+        torque = path.connector(turns[0]).force
+        assert abs(torque[-1]) < 1e-6 * np.abs(torque).max()
+    coarse = abs(ends[1] / (2 * R / 3) - 1)
+    assert abs(extrapolated(ends) / (2 * R / 3) - 1) < 10 * coarse**2
+
+
+def test_a_helix_of_ten_turns():
+    """Tip of Ibrahimbegović's beam (1997), by shooting: differential equation to 6 digits."""
+    coil, tips = ub.Section(EA=1e4, GA=1e4, GA3=1e4, EI=1e2, EI2=1e2, GJ=1e2), []
+    for cells in (200, 400):
+        beam = ub.Beam((0, 0, 0), (10, 0, 0), coil, cells=cells)
+        load = ub.PointLoad(
+            beam.end, force=(0, 0, 50), moment=(0, 0, 200 * np.pi), amplitude=lambda t: t
+        )
+        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, progress=False)
+        tips.append(run.position(beam.end)[-1])
+    assert np.abs(extrapolated(tips) - [0.0048030, 0.000072, -0.076442]).max() < 5e-6
+
+
+# -- derivatives of runs ---------------------------------------------------------------------------
+
+
+def growing(t):
+    return t
+
+
+def bent_arm(EI=500.0, force=30.0, length=4.0, arm=0.5):
+    """Two beams, with a body that a spring pulls at an arm."""
+    section = ub.Section(**STIFF | OTHER | {"EI": EI})
+    first = ub.Beam((0, 0, 0), (length, 1, 0), section, cells=2)
+    second = ub.Beam((length, 1, 0), (length, 1, 2), section, cells=1, up=(1, 0, 0))
+    ball = ub.Body((length, 1, 2.5), mass=2.0, inertia=(0.3, 0.3, 0.4))
+    pull = ub.Stretch(ball.at(length, 1 + arm, 2.5), ub.ground(2, 4, 4), ub.Spring(20.0))
+    loads = [
+        ub.PointLoad(
+            second.end, force=(0, force, 0.5 * force), moment=(0, 2 * force, 0), amplitude=growing
+        ),
+        ub.Gravity((0, 0, -1.0), amplitude=growing),
+    ]
+    return ub.Scene(
+        [first, second], bodies=[ball], connectors=[pull], supports=[ub.Clamped(first.start)],
+        joints=[ub.Rigid(first.end, second.start), ub.Rigid(second.end, ball.at(length, 1, 2))],
+        loads=loads,
+    )  # fmt: skip
+
+
+AT = {"EI": 500.0, "force": 30.0, "length": 4.0, "arm": 0.5}
+RESULTS = {
+    "rotation": lambda s: s.displacement(s.scene.beams[1].end)[-1],
+    "point of a body": lambda s: s.position(s.scene.connectors[0].a)[-1],
+    "section forces": lambda s: s.section_forces(s.scene.beams[0])[0],
+    "reaction": lambda s: s.reaction(s.scene.supports[0])[-1],
+    "energy": lambda s: s.energy["stored"][-1],
+    "spring": lambda s: s.connector(s.scene.connectors[0]).force[-1],
+}
+
+
+def by_differences(quantity, scheme, dt, **options):
+    """Return central differences of runs of fourth order."""
+    found = []
+    for name, value in AT.items():
+        h = 2e-3 * value
+        runs = [
+            ub.simulate(
+                bent_arm(**AT | {name: value + k * h}), scheme, t=(0, 1), dt=dt, progress=False,
+                **options,
+            )
+            for k in (-2, -1, 1, 2)
+        ]  # fmt: skip
+        far, near, near1, far1 = map(np.asarray, map(quantity, runs))
+        found.append((8 * (near1 - near) - (far1 - far)) / (12 * h))
+    return np.stack(found, axis=-1)
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
+def test_derivatives_of_runs(scheme):
+    """All results, by differences of runs; the adjoint; a run in two parts."""
+    run = ub.differentiate(bent_arm, AT, scheme, t=(0, 1), dt=0.1, newton=EXACT)
+    for quantity in RESULTS.values():
+        exact = by_differences(quantity, scheme, 0.1, newton=EXACT)
+        assert np.abs(run.of(quantity) - exact).max() < 1e-6 * np.abs(exact).max()
+
+    def height(s):
+        return s.displacement(s.scene.bodies[0].middle)[:, 2]
+
+    _, slopes = ub.gradient(bent_arm, AT, scheme, t=(0, 1), dt=0.1, newton=EXACT, of=height)
+    direct = run.of(lambda s: height(s)[-1])
+    assert np.abs(slopes - direct).max() < 1e-9 * np.abs(direct).max()
+    with pytest.raises(ub.ArgumentError, match="rotations in space, of which there is no adjoint"):
+        ub.gradient(
+            bent_arm, AT, scheme, t=(0, 1), dt=0.1,
+            of=lambda s: s.displacement(s.scene.bodies[0].middle)[:, 3],
+        )  # fmt: skip
+
+
+def test_derivatives_of_a_run_in_two_parts():
+    scheme = ub.EnergyMomentum()
+    whole = ub.differentiate(bent_arm, AT, scheme, t=(0, 1), dt=0.1, newton=EXACT)
+    first = ub.differentiate(bent_arm, AT, scheme, t=(0, 0.5), dt=0.1, newton=EXACT)
+    second = ub.differentiate(bent_arm, AT, scheme, t=(0.5, 1), dt=0.1, newton=EXACT, start=first)
+    for name in ("rotation", "point of a body"):
+        a, b = whole.of(RESULTS[name]), second.of(RESULTS[name])
+        assert np.abs(a - b).max() < 1e-9 * np.abs(a).max()

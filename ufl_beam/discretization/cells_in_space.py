@@ -110,9 +110,10 @@ def velocity_in_space(
 
 
 def turned_further(numbering: DofNumbering, turns: Array, change: Array) -> Array:
-    """Return :data:`TURNS` after changes of the unknowns, as rotation vectors; (nodes, 4)."""
+    """Return :data:`TURNS` after changes of the unknowns, which are Cayley vectors; (nodes, 4)."""
     dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[: len(turns), 3:]
-    quaternions = (_rotations(turns) * Rotation.from_rotvec(change[dofs])).as_quat()
+    steps = Rotation.from_quat(np.pad(change[dofs] / 2, ((0, 0), (0, 1)), constant_values=1.0))
+    quaternions = (_rotations(turns) * steps).as_quat()
     return np.asarray(np.roll(quaternions, 1, axis=1) - np.eye(4)[0])
 
 
