@@ -177,7 +177,7 @@ class DofNumbering:
         self.size = len(order) + len(self.multipliers)
 
     def components(self, component: int) -> tuple[int, ...]:
-        """Return :meth:`Scene.components`."""
+        """Return the unknowns of a node for a component, see :meth:`Scene.components`."""
         return self.scene.components(component)
 
     def agrees(self, numbering: DofNumbering) -> bool:
