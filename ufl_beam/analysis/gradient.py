@@ -105,7 +105,8 @@ def gradient(
 
     Raises:
         ArgumentError: As in :func:`differentiate`; the history depends on something else than the
-            motion at its times; ``reduce`` returns no finite number; or steps were divided.
+            motion at its times, in space on its displacements; ``reduce`` returns no finite number;
+            or steps were divided.
 
     Example:
         >>> def frame(**EI):

@@ -414,7 +414,8 @@ def buckling(
     displacements.  Factors are exact if the path is straight, as of columns and of frames under
     forces in line with their columns; else the error grows with the factor and with the curvature
     of the path.  If loads bend beams long before they buckle, factors have no meaning; a warning
-    lists these factors.
+    lists these factors.  In space, these factors are only estimates of the results, at which the
+    stiffness in equilibrium vanishes, also if loads bend beams before.
 
     Args:
         scene: Model.
