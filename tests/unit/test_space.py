@@ -498,12 +498,12 @@ def refused():
     scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
     dynamic = {"scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 0.05, "progress": False}
     run = ub.simulate(scene, **dynamic)
-    control = ub.LoadControl(0.1)
     return {
         "plot": lambda: ub.plot(run, "damage"),
-        "buckling": lambda: ub.buckling(scene, 1),
-        "modes": lambda: ub.modes(scene, 1),
-        "follow": lambda: ub.follow(scene, control, steps=1),
+        "response spectrum analysis": lambda: st.response_spectrum_analysis(scene, lambda T: 1.0),
+        "linearize": lambda: ub.linearize(
+            scene, inputs=[scene.supports[0]], outputs=[("displacement", BEAM.end)]
+        ),
         "joint": lambda: run.joint(None),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.forms,
     }

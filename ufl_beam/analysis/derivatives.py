@@ -23,6 +23,7 @@ import numpy.typing as npt
 from ufl_beam.analysis.neighbouring_scenes import Beside, NeighbouringScene, Numbers, alike
 from ufl_beam.arrays import Array, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
+from ufl_beam.discretization.cells_in_space import TURNS, turned_further
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.display import in_one_line
@@ -222,7 +223,6 @@ class Case:
         """Return the scene for the values :attr:`at` with ``changes``."""
         scene = self._model(**{**self.at, **changes})
         require_kind(scene, Scene, f"{self._call}: the result of model")
-        scene.require_plane(self._call)
         return scene
 
     def begin_at_end_of(self, start: Derivatives) -> None:
@@ -614,10 +614,42 @@ class Derivatives:
             states["v"] = solution.v + change * self._v[:, p]
         reactions = solution.column("reactions")[:,]
         for k, support in enumerate(solution.scene.supports):
-            dofs, components = solution.numbering.node(support.place), [*support.held]
+            dofs, numbering = solution.numbering.node(support.place), solution.numbering
+            components = [k for c in support.held for k in numbering.components(c)]
             at = np.searchsorted(self._constrained_dofs, dofs[components])
             reactions[:, k, components] += change * self._reactions[:, p, at]
+        if solution.scene.in_space:
+            states[TURNS] = self._turns(p, change)
         return states | {"reactions": reactions}
+
+    def _turns(self, p: int, change: float) -> Array:
+        """Return the rotations in space if parameter ``p`` grows by ``change``.
+
+        They are products of the rotations in steps.
+        """
+        before, solution = self._start or self._case.start, self.solution
+        turns = before._turns(p, change)[-1] if before else solution.column(TURNS)[:,][0]
+        found, (_, stored, q) = [turns], self._all_ends(p, change)
+        for step, kept in zip(np.diff(q, axis=0), stored, strict=True):
+            turns = turned_further(solution.numbering, turns, step)
+            found += [turns] * int(kept)
+        return np.array(found)
+
+    def _all_ends(self, p: int, change: float) -> tuple[Array, Array, Array]:
+        """Return steps and substeps if parameter ``p`` grows by ``change``.
+
+        They are rows for :meth:`Simulation.repeat`, whether they are stored, and the initial
+        configuration with those at their ends; (n, 3), (n,), (n+1, size).
+        """
+        ends, q = self.solution.times[1:], self.solution.q + change * self._q[:, p]
+        steps: Array = np.column_stack([ends, ends, np.zeros(len(ends))])
+        stored: Any = np.ones(len(ends), bool)
+        if self._substeps is not None and len(self._substeps[0]):
+            some, known, slopes = self._substeps
+            at = np.searchsorted(ends, some[:, 0])
+            steps, stored = np.insert(steps, at, some, axis=0), np.insert(stored, at, False)
+            q = np.insert(q, at + 1, known + change * slopes[:, p], axis=0)
+        return steps, stored, q
 
     def _motions(self) -> list[list[Solution]]:
         """Return motions and reactions at neighbouring values of each parameter."""
@@ -704,14 +736,8 @@ class Derivatives:
         if self._start is not None:
             earlier = self._start._repeat(simulation, p, change)
             simulation.solution = Solution(earlier.scene, earlier.numbering, earlier)
-        ends, q = self.solution.times[1:], self._states(p, change)["q"][1:]
-        steps = np.column_stack([ends, ends, np.zeros(len(ends))])
-        if self._substeps is not None and len(self._substeps[0]):
-            some, known, slopes = self._substeps
-            at = np.searchsorted(ends, some[:, 0])
-            steps = np.insert(steps, at, some, axis=0)
-            q = np.insert(q, at, known + change * slopes[:, p], axis=0)
-        simulation.repeat(steps, q)
+        steps, _, q = self._all_ends(p, change)
+        simulation.repeat(steps, q[1:])
         simulation.end()
         return simulation.solution
 

@@ -24,6 +24,7 @@ from ufl_beam.analysis.derivatives import (
 )
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
+from ufl_beam.discretization.cells_in_space import TURNS
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import (
@@ -49,7 +50,7 @@ SMALL = 2.0**-17
 
 ALIKE = 1e-9  # relative difference of slopes by small and large steps that counts as round-off
 
-MOTION = "t", "q", "v"
+MOTION = "t", "q", "v", TURNS
 """Columns of states on which histories may depend."""
 
 FINER = 2.0**-6
@@ -104,7 +105,8 @@ def gradient(
 
     Raises:
         ArgumentError: As in :func:`differentiate`; the history depends on something else than the
-            motion at its times; ``reduce`` returns no finite number; or steps were divided.
+            motion at its times, in space on its displacements; ``reduce`` returns no finite number;
+            or steps were divided.
 
     Example:
         >>> def frame(**EI):
@@ -263,6 +265,24 @@ class _History:
                 "finite values, and leave out those that reduce does not need"
             )
         self.value = self._number(reference)
+        if self._numbering.scene.in_space:
+            self._require_no_rotations()
+
+    def _require_no_rotations(self) -> None:
+        """Raise if the history depends on rotations in space, which are no sums of unknowns."""
+        columns = [x.columns.column_of(TURNS, x.rows) for x in self._blocks]
+        kept = [column.copy() for column in columns]
+        for column in columns:
+            column += SMALL
+        depends = not np.array_equal(self._in(self._numbering), self._reference)
+        for column, before in zip(columns, kept, strict=True):
+            column[:] = before
+        if depends:
+            raise ArgumentError(
+                "gradient: the history depends on rotations in space, of which there is no "
+                "adjoint; take displacements of places of beams or centres of bodies, or use "
+                "differentiate"
+            )
 
     def _in(self, numbering: DofNumbering) -> Array:
         """Return the history in a scene."""

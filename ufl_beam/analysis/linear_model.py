@@ -571,6 +571,8 @@ def linearize(
         >>> print(abs(model.frequency_response(1e-3)[0, 1]).round(6))  # as the support
         [1.]
     """
+    require_kind(scene, Scene, "linearize: scene")
+    scene.require_plane("linearize")
     at = require_state("linearize", scene, at, mesh)
     sequences = {"inputs": inputs, "outputs": outputs}
     for name, some in sequences.items():

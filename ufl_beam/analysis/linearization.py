@@ -21,6 +21,7 @@ from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.cell_functions import mass_forces, stress_forces
+from ufl_beam.discretization.cells_in_space import TURNS
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_touching, warn_of_warping
@@ -60,6 +61,16 @@ class _Standstill(Newmark):
         return Coefficients(own.inertia, (1 / dt, 0.0, 0.0), own.rates[:1])
 
 
+class _StandstillInSpace(_Standstill):
+    """The same for motions whose changes of rotations are Cayley vectors; momenta do not turn."""
+
+    half_tangents = True
+
+    def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
+        own = super().coefficients(dt, last_dt, known)
+        return own._replace(rates=[own.velocity])
+
+
 class Linearization:
     """Matrices of small motions about a state, without degrees of freedom constrained by supports.
 
@@ -69,6 +80,7 @@ class Linearization:
     Attributes:
         tangent: Derivative of forces with respect to all unknowns; (size, size).
         masses: Masses of all unknowns; (size, size).
+        turns: Column of the state with the rotations in space, see :data:`TURNS`; (nodes, 4).
         K, M, C: Stiffness, mass and damping of free motions and scaled forces of constraints.
         left: Degrees of freedom of the rows of K, in the axes of supports.
         scale: Factors of the unknowns of K; (size,).
@@ -78,7 +90,6 @@ class Linearization:
     def __init__(
         self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
-        scene.require_plane("modes, buckling and linear models")
         time = 0.0 if at is None else float(at.times[-1])
         if any(isinstance(load, MovingLoad) and load.mass for load in scene.loads):
             loads = [replace(x, mass=0.0) if isinstance(x, MovingLoad) else x for x in scene.loads]
@@ -86,9 +97,8 @@ class Linearization:
         # All processes compute all matrices, so that no result depends on their number.
         with warnings.catch_warnings(), each_warning_once(anew=True):
             warnings.simplefilter("ignore", ModelWarning)  # these warnings concern runs
-            simulation = Simulation(
-                scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
-            )
+            scheme = _StandstillInSpace() if scene.in_space else _Standstill()
+            simulation = Simulation(scene, scheme, t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF)
         warn_of_touching(simulation.numbering)
         warn_of_warping(scene)
         warn_of_held_motions(scene)
@@ -96,6 +106,9 @@ class Linearization:
             simulation.t = t
         self.scene, self._simulation = scene, simulation
         self.beams, self.numbering, self.q = simulation.beams, simulation.numbering, simulation.q
+        self.turns: Array = np.zeros((0, 4))
+        if scene.in_space:
+            self.turns = simulation.now.column(TURNS)[0,].copy()
         simulation.solver.destroy()  # not closed: functions of a user are called below
         # Plastic strains and openings of hinges are constant from now on.
         simulation.controllers.evaluate(simulation)
@@ -311,7 +324,8 @@ class Linearization:
 
     def _motion_of(self, connector: Connector) -> int:
         """Return a degree of freedom with the unit of the motion of a connector."""
-        return int(self.numbering.node(connector.b)[2 if connector.is_rotation else 0])
+        first = self.numbering.displacements if connector.is_rotation else 0
+        return int(self.numbering.node(connector.b)[first])
 
     def forces(self) -> tuple[Array, Array]:
         """Return all forces except inertia, (size,), and those on the ends of cells.

@@ -21,6 +21,14 @@ from ufl_beam.arrays import Array, Complex
 from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.cell_functions import strains_of, stress_forces
+from ufl_beam.discretization.cells_in_space import (
+    STIFFNESS_IN_SPACE,
+    TURNS,
+    CellsOfState,
+    cell_axes,
+    turned_further,
+    velocity_in_space,
+)
 from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
@@ -67,10 +75,11 @@ class Shapes(Rich, ABC):
         scene: Model.
         numbering: Vertices, cells and degrees of freedom of the scene.
         q: Configuration of the state of the modes, ordered by ``numbering``; (size,).
+        turns: Rotations of the nodes in the state, in space, as quaternions minus 1; (nodes, 4).
         shapes: Modes, in columns; (size, n); complex if phases differ.  The largest displacement is
             1; in a mode without displacements, the largest rotation is 1.
         section_law: b and D of the section forces b + D e of cells for strains e, at p integration
-            points; (num_cells, 3 p), (num_cells, 9 p).
+            points; (num_cells, 3 p), (num_cells, 9 p), or in space (num_cells, 6), (num_cells, 36).
         resultants: Resultants of the cells in the state, ``cell_number`` of loops.h; zero in an
             unloaded scene; (9, num_cells).
     """
@@ -78,6 +87,7 @@ class Shapes(Rich, ABC):
     scene: Scene
     numbering: DofNumbering
     q: Array
+    turns: Array
     shapes: Array | Complex
     section_law: tuple[Array, Array]
     resultants: Array
@@ -102,11 +112,16 @@ class Shapes(Rich, ABC):
     def shape(self, k: int, place: AttachmentPoint) -> Array | Complex:
         """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
+        In space, return the displacement, and the rotation about axes of the node; (6,).
+
         Raises:
             ArgumentError: There is no such mode, or the place is not in the scene.
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
+        if self.scene.in_space:
+            moved = velocity_in_space(self.numbering, place, shape[None], self.turns[None])
+            return np.asarray(moved[0])
         return np.asarray(velocity_at(self.numbering, place, self.q[None], shape[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
@@ -129,6 +144,13 @@ class Shapes(Rich, ABC):
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
         states = np.ascontiguousarray(self.q + swing)
+        solution = Solution(self.scene, self.numbering)
+        history = {"t": times, "q": states, "every": np.array([1])}
+        if self.scene.in_space:
+            turns = [turned_further(self.numbering, self.turns, change) for change in swing]
+            cells = np.zeros((count + 1, *self.resultants.shape))
+            solution.resume(history | {TURNS: np.array(turns), FORCES: cells})
+            return solution
         subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
         fields, r = Fields(subdomain), np.zeros(subdomain.size)
         form = stress_forces(fields, self.section_law)
@@ -139,9 +161,7 @@ class Shapes(Rich, ABC):
             cell_forces.accept()
             stresses.append(cell_forces(q, q))
         cells = self.resultants + np.array(stresses[1:]) - stresses[0]
-        history = {"t": times, "q": states, "every": np.array([1]), FORCES: cells}
-        solution = Solution(self.scene, self.numbering)
-        solution.resume(history)
+        solution.resume(history | {FORCES: cells})
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
@@ -164,9 +184,8 @@ class Shapes(Rich, ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
-        strains = strains_of(Fields(subdomain))
         frames: list[Any] = [
-            _Frame(self, subdomain, strains, float(k), self._scaled(k, amplitude).real)
+            _Frame(self, subdomain, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))
         ]
         try:
@@ -182,7 +201,8 @@ class Shapes(Rich, ABC):
         If the mode has rotations only, the largest rotation is ``amplitude`` in rad.
         """
         shape = self.shapes[:, k]
-        lengths = np.r_[self.numbering.dofs, self.numbering.dofs_of_bodies][:, :2]
+        lengths = np.r_[self.numbering.dofs, self.numbering.dofs_of_bodies]
+        lengths = lengths[:, : self.numbering.displacements]
         size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
         scaled: Array | Complex = amplitude * size * shape
         return scaled
@@ -197,27 +217,37 @@ class _Frame:
 
     may_break = False
 
-    def __init__(
-        self, shapes: Shapes, subdomain: Subdomain, strains: Any, t: float, change: Array
-    ) -> None:
+    def __init__(self, shapes: Shapes, subdomain: Subdomain, t: float, change: Array) -> None:
         self.scene, self.numbering = shapes.scene, shapes.numbering
         self.comm, self.subdomain = subdomain.comm, subdomain
         self.q, self.t = shapes.q + change, t
-        self._shapes, self._strains, self._change = shapes, strains, change
+        self._shapes, self._fields, self._change = shapes, Fields(subdomain), change
         self.now = Solution(self.scene, self.numbering)
         history = {"t": np.array([t]), "q": self.q[None], "every": np.array([1])}
+        if self.scene.in_space:
+            history[TURNS] = turned_further(self.numbering, shapes.turns, change)[None]
         self.now.resume(history | {FORCES: shapes.resultants[None]})
 
     def connections(self) -> Array:
         return np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
 
     def section_forces(self) -> Array:
-        """Return mean section forces of the mode alone; (num_cells, 3); N, N, N m."""
-        q, (_, D), ε = self._shapes.q, self._shapes.section_law, 1e-5
-        ends = [self._strains(q + sign * ε * self._change) for sign in (1.0, -1.0)]
-        e = ((ends[0] - ends[1]) / (2 * ε)).reshape(len(D), -1, 3)
+        """Return mean section forces of the mode alone; (num_cells, 3 or 6); N, N, N m."""
+        (_, D), ε = self._shapes.section_law, 1e-5
+        ends = [self._strains(sign * ε * self._change) for sign in (1.0, -1.0)]
+        e = ((ends[0] - ends[1]) / (2 * ε)).reshape(len(D), -1, 6 if self.scene.in_space else 3)
         weights = self.numbering.mesh.point_weights
-        return np.asarray(np.einsum("p,cpij,cpj->ci", weights, D.reshape(*e.shape, 3), e))
+        D = D.reshape(*e.shape, e.shape[-1])
+        return np.asarray(np.einsum("p,cpij,cpj->ci", weights, D, e))
+
+    def _strains(self, change: Array) -> Array:
+        """Return the strains after a change of the state of the modes."""
+        shapes, q = self._shapes, self._shapes.q + change
+        if not self.scene.in_space:
+            return strains_of(self._fields)(q)
+        turns = turned_further(self.numbering, shapes.turns, change)
+        axes = cell_axes(self._fields)
+        return CellsOfState.of(self.numbering, axes, q, turns).strains()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -370,7 +400,8 @@ def computed_modes(
         warn_of_relaxation("modes", small)
     exponents, shapes = small.exponents(n, damped=damped)
     stresses = _stresses(small, at)
-    return Modes(scene, small.numbering, small.q, shapes, *stresses, exponents)
+    state = scene, small.numbering, small.q, small.turns
+    return Modes(*state, shapes, *stresses, exponents)
 
 
 @each_warning_once()
@@ -385,7 +416,8 @@ def buckling(
     displacements.  Factors are exact if the path is straight, as of columns and of frames under
     forces in line with their columns; else the error grows with the factor and with the curvature
     of the path.  If loads bend beams long before they buckle, factors have no meaning; a warning
-    lists these factors.
+    lists these factors.  In space, these factors are only estimates of the results, at which the
+    stiffness in equilibrium vanishes, also if loads bend beams before.
 
     Args:
         scene: Model.
@@ -414,7 +446,6 @@ def buckling(
         1.00
     """
     require_kind(scene, Scene, "buckling: scene")
-    scene.require_plane("buckling")
     n = require_count(n, "buckling: n")
     at = require_state("buckling", scene, at, mesh)
     require_number(t, "buckling: t")
@@ -440,7 +471,13 @@ def buckling(
     small = SmallMotions(scene, at, t, mesh)
     require_no_spin("buckling", small, at)
     warn_of_limits("buckling", small)
-    factors, shapes, errors, others = small.buckling(n)
+    if scene.in_space:
+        static = Simulation(scene, Static(), t0=t, start=at, mesh=mesh, comm=MPI.COMM_SELF)
+        with closing(static):
+            found = small.buckling_in_space(n, static)
+    else:
+        found = small.buckling(n)
+    factors, shapes, errors, others = found
     stiff = any(beam.section.GA > 10 * beam.section.EA for beam in scene.beams)
     wrong = (
         ": the stiffness of their shapes does not vanish there, because the loads bend, turn or "
@@ -456,12 +493,17 @@ def buckling(
         listed = ", ".join(f"{x:.4g}" for x in np.sort(others)[:n])
         warn(f"buckling: factors of magnitude {listed} are complex and left out{wrong}")
     stresses = _stresses(small, at)
-    return Buckling(scene, small.numbering, small.q, shapes, *stresses, factors, errors)
+    state = scene, small.numbering, small.q, small.turns
+    return Buckling(*state, shapes, *stresses, factors, errors)
 
 
 def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Array], Array]:
     """Return the law and the resultants of the cells in the last state of ``at``, or without it."""
     law, count = section_law(small.beams, small.numbering), len(small.numbering.cells)
+    if small.scene.in_space:
+        fields = Fields(Subdomain(small.numbering, MPI.COMM_SELF))
+        D = fields.section_values(*STIFFNESS_IN_SPACE)[:, :, None] * np.eye(6)
+        law = np.zeros((count, 6)), D.reshape(-1, 36)
     return law, np.zeros((lib.CELL_NUMBERS, count)) if at is None else at.cell_resultants(-1)
 
 
@@ -492,8 +534,8 @@ def require_no_spin(call: str, small: SmallMotions, at: Solution | None) -> None
     first = small.undamped(1, (small.K + small.K.T) / 2, definite=True)[-1] ** 0.5
     parts: list[Any] = [*small.scene.rigid_bodies, *small.scene.beams]
     for part in parts:
-        rotations = small.numbering.nodes_of(part)[1][:, 2]
-        if (rate := abs(at.v[-1][rotations].mean())) > SPIN * first:
+        rotations = small.numbering.nodes_of(part)[1][:, small.numbering.displacements :]
+        if (rate := np.linalg.norm(at.v[-1][rotations].mean(axis=0))) > SPIN * first:
             raise ArgumentError(
                 f"{call}: at turns: {part} by {rate:.3g} rad/s, beside a first frequency of "
                 f"{first:.3g} rad/s; its centrifugal and Coriolis forces would be missing. Put a "

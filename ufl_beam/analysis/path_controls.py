@@ -8,6 +8,7 @@ unknowns.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Annotated, ClassVar, NamedTuple
@@ -107,6 +108,20 @@ class PathCorrector:
     def size(self, motion: Array) -> float:
         """Return the length of a change of the configuration; dimensionless."""
         return self.length(np.append(motion, 0.0))
+
+    def carried(self, direction: Array, trial: Trial) -> Array:
+        """Return a direction at the end of a step, in the unknowns of the next step.
+
+        In space, rotations in a step are Cayley vectors in axes of the nodes before the step.
+        """
+        if not self.simulation.scene.in_space:
+            return direction
+        numbering, carried = self.subdomain.numbering, direction.copy()
+        nodes = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[:, 3:]
+        m, w = (trial.q1 - trial.step.q0)[nodes], direction[nodes]
+        turned = w - np.cross(m, w) / 2
+        carried[nodes] = turned / (1 + np.sum(m * m, axis=1, keepdims=True) / 4)
+        return carried
 
     def dissipation(self, q: Array) -> float:
         """Return the energy that cells and connectors dissipate in the step to ``q``; J."""
@@ -457,7 +472,7 @@ class DisplacementControl(Control):
 
     Args:
         place: Place of a beam.
-        component: "u", "v" or "psi".
+        component: "u", "v" or "psi", in space "u", "v" or "w".
         step: Change of the component; m or rad.
         end: Displacement or rotation at which the path ends, with shorter last steps; m or rad.
 
@@ -481,11 +496,15 @@ class DisplacementControl(Control):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.component not in COMPONENTS:
+        if self.component not in self._components:
             raise ArgumentError(
                 f"DisplacementControl: component = {self.component!r} must be one of "
-                f"{', '.join(COMPONENTS)}"
+                f"{', '.join(self._components)}"
             )
+
+    @property
+    def _components(self) -> Sequence[str]:
+        return "uvw" if len(self.place.point) == 3 else COMPONENTS
 
     def require(self, scene: Scene) -> None:
         """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
@@ -503,7 +522,7 @@ class DisplacementControl(Control):
         """Return the fraction of a step to :attr:`end`, at most ``fraction``; 0 at the end."""
         if self.end is None:
             return fraction
-        component = COMPONENTS.index(self.component)
+        component = self._components.index(self.component)
         now = float(corrector.simulation.displacement(self.place)[component])
         left = (self.end - now) / self.step
         if abs(left) <= AT_END * max(1.0, abs(self.end / self.step)):
@@ -520,7 +539,7 @@ class DisplacementControl(Control):
         """Return the gradient of the component, with the sign of ``step``."""
         subdomain, normal = corrector.subdomain, np.zeros(corrector.subdomain.numbering.size)
         nodes, weights = subdomain.numbering.weights(self.place)
-        normal[subdomain.numbering.dofs[nodes, COMPONENTS.index(self.component)]] += weights
+        normal[subdomain.numbering.dofs[nodes, self._components.index(self.component)]] += weights
         local = normal[subdomain.dofs] * math.copysign(1.0, self.step)
         local[subdomain.num_owned :] = 0.0
         return np.append(local, 0.0)

@@ -185,7 +185,6 @@ def follow(
             f"follow: control = {control!r} must be ArcLength(...), LoadControl(...), "
             "DisplacementControl(...) or DissipationControl(...)"
         )
-    scene.require_plane("follow")
     control.require(scene)
     require_count(steps, "follow: steps")
     require_switch(progress, "follow: progress")
@@ -359,7 +358,8 @@ class PathStepper:
         corrector = self.corrector
         corrector.dissipates = corrector.dissipation(candidate.trial.q1) > 0.0
         self._simulation.accept(candidate.trial)
-        corrector.direction, self._before = candidate.direction, candidate
+        corrector.direction = corrector.carried(candidate.direction, candidate.trial)
+        self._before = candidate
 
     def _candidate(
         self, trial: Trial, stiffness: Stiffness, direction: Array, mode: Array | None = None
@@ -510,10 +510,11 @@ class PathStepper:
             simulation.supports.into_plane(mode)
             # A singular stiffness gives no accurate component along the mode; it stays as before.
             along = corrector.along(corrector.weights[:-1] * mode, (direction - before)[:-1])
-            corrector.direction = direction - along * np.append(mode, 0.0)
+            turned = direction - along * np.append(mode, 0.0)
+            corrector.direction = corrector.carried(turned, candidate.trial)
         kind = "limit" if limit else "bifurcation"
         state = simulation.snapshot()
-        mode = corrector.subdomain.gather(mode)
+        mode = corrector.subdomain.gather(corrector.carried(mode, candidate.trial))
         self.critical.append(CriticalPoint(kind, simulation.t, n, state, mode))
 
 

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from functools import partial
 from typing import TypeVar
 
@@ -10,16 +12,26 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Complex
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_scheme import Step
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import DENSE, ROUND_OFF, SHIFT, ZERO
+
+Found = tuple[Array, Array | Complex, Array, Array]
+"""Results of :meth:`SmallMotions.buckling`."""
 
 V = TypeVar("V", Array, Complex)
 
 REAL = 1e-6  # imaginary part of a buckling factor that is round-off, as a fraction
 SECOND = 1e-3  # change for second derivatives; rad, or fraction of the size of the scene
+MOST_REFINEMENTS = 20  # largest number of iterations for a buckling factor in space
+REFINED = 1e-8  # change of a buckling factor in the last iteration, as a fraction
+SAME = 1e-6  # difference of factors that may be one, as a fraction
 MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
 
 
@@ -129,7 +141,7 @@ class SmallMotions(Linearization):
 
     # -- buckling ------------------------------------------------------------------------------
 
-    def buckling(self, n: int) -> tuple[Array, Array | Complex, Array, Array]:
+    def buckling(self, n: int) -> Found:
         """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
 
         The shapes are (n,), (size, n) and (n,).  The factors are real solutions of
@@ -177,6 +189,66 @@ class SmallMotions(Linearization):
         shapes = self._nearest(n, factors, (x @ mix).astype(complex))
         return *shapes, np.array(errors), others
 
+    def buckling_in_space(self, n: int, static: Simulation) -> Found:
+        """Compute the results of :meth:`buckling` with stiffnesses in equilibrium.
+
+        Second-order paths as in the plane would miss forces of third order, which are large in
+        slender beams that the loads bend.  So a ``static`` simulation in the same state finds the
+        equilibrium at each estimate of a factor.  The stiffness there, and its slope since the last
+        estimate, yield the next estimate.  Errors are the last changes.
+        """
+        (u, _), supports = self.linear_change("buckling"), static.supports
+
+        def stiffness(λ: float) -> csr_array:
+            step = Step(-math.inf, static.t, self.q, static.t, static.t, fraction=λ)
+            guess = supports.in_axes(self.q + λ * u)
+            supports.move(guess, guess, step)
+            q1 = static.attempt_along(step, guess, None).q1
+            return self._reduced(self._matrix(static.equation.linearize(q1, step)[1]))
+
+        ε = SECOND / np.abs(u * self.numbering.scales).max()
+        K, ends = self.K, [stiffness(sign * ε) for sign in (1.0, -1.0)]
+        slope, bend = (ends[0] - ends[1]) / (2 * ε), (ends[0] + ends[1] - 2 * K) / (2 * ε**2)
+        λ, x = eigensolvers.quadratic_near_zero(K, slope, bend, n)
+        real = np.abs(λ.imag) <= REAL * np.abs(λ)
+        others, found = [*np.abs(λ[~real])], list[tuple[float, float, Array]]()
+        for guess in np.flatnonzero(real)[np.argsort(np.abs(λ[real]), kind="stable")]:
+            if len(found) == n:
+                break
+            try:
+                new = self._refined(λ[guess].real, x[:, guess].real, stiffness)
+            except StepFailed:
+                others.append(abs(λ[guess]))
+                continue
+            if new[1] > REFINED:
+                others.append(abs(λ[guess]))
+            elif not any(_same(new, other) for other in found):
+                found.append(new)
+        factors, errors = np.array([pair[:2] for pair in found]).reshape(-1, 2).T
+        shapes = np.array([y for *_, y in found], dtype=complex).reshape(-1, len(x)).T
+        order = np.argsort(np.abs(factors), kind="stable")
+        return *self._nearest(n, factors, shapes), errors[order], np.array(others)
+
+    def _refined(
+        self, λ: float, x: Array, stiffness: Callable[[float], csr_array]
+    ) -> tuple[float, float, Array]:
+        """Return a buckling factor near ``λ``, its last relative change, and its shape near x."""
+        before, last, change = 0.0, self.K, 1.0
+        for _ in range(MOST_REFINEMENTS):
+            K = stiffness(λ)
+            slope = (K - last) / (λ - before)
+            try:
+                x = splu(K.tocsc()).solve(slope @ x)
+            except RuntimeError:  # the stiffness is singular
+                return λ, 0.0, x
+            x /= np.abs(x).max()
+            before, last = λ, K
+            λ -= (x @ (K @ x)) / (x @ (slope @ x))
+            change = abs(λ / before - 1)
+            if change <= REFINED:
+                break
+        return λ, change, x
+
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
 
@@ -208,3 +280,10 @@ class SmallMotions(Linearization):
         shapes = shapes / largest
         real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
         return values[order], np.asarray(shapes.real if real else shapes)
+
+
+def _same(one: tuple[float, float, Array], other: tuple[float, float, Array]) -> bool:
+    """Return whether two pairs of a factor and a shape are equal."""
+    (λ, _, x), (λ1, _, y) = one, other
+    parallel = abs(x @ y) > (1 - SAME) * np.linalg.norm(x) * np.linalg.norm(y)
+    return bool(parallel and abs(λ / λ1 - 1) < SAME)

@@ -11,10 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
 from ufl.core.expr import Expr
 
+from ufl_beam.arrays import Array
 from ufl_beam.blocks.statement import Inputs, Statement
+from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.mechanics.spatial_kinematics import Turn, Vector, product, subtract
 from ufl_beam.mechanics.time_scheme import Scheme
 
@@ -39,6 +43,17 @@ def quaternion(at: Inputs, k: int) -> Vector:
     """Return the quaternion of a node before the step."""
     real, *others = (at[name] for name in quaternion_names(k))
     return (1.0 + real, *others)
+
+
+def put_turns(block: Any, turns: Array) -> None:
+    """Set the quaternions of the nodes of elements from those at rotations; (size, 4)."""
+    state = getattr(block, "state", {})
+    for k in range(block.statement.nodes if quaternion_names(0)[0] in state else 0):
+        names = block.statement.unknowns
+        dofs = np.reshape(block._elements.dofs, (-1, len(names)))[:, names.index(f"a{k}")]
+        values = in_batches(turns[dofs], BATCH)
+        for i, name in enumerate(quaternion_names(k)):
+            state[name][:] = values[:, i]
 
 
 def vector(at: Inputs, group: str, names: str, k: int) -> Vector:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import StatementOnCell
 from ufl_beam.blocks.moving_loads import moving_loads
@@ -25,7 +24,6 @@ from ufl_beam.blocks.nodes_in_space import (
     vector,
 )
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
-from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.spatial_kinematics import (
@@ -218,16 +216,6 @@ class LoadsInSpace(Block):
     """Loads at nodes, whose rotations are states."""
 
     remembers = True
-
-    def take_turns(self, turns: Array) -> None:
-        """Set the quaternions of the nodes, which ``turns`` has at their first rotations."""
-        n = self.statement.nodes
-        for k in range(n):
-            own = in_batches(
-                turns[np.reshape(self._elements.dofs, (-1, 6 * n))[:, 3 * n + k]], BATCH
-            )
-            first = len(self.statement.state) - 4 * (n - k)
-            self._states[:, first : first + 4] = own
 
 
 def own_work(statement: Statement) -> bool:

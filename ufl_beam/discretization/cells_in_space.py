@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors
+from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors, values_at
 from ufl_beam.discretization.function_spaces import STIFFNESS, Fields
-from ufl_beam.model.bodies import AttachmentPoint, BodyPoint
+from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, arm
 
 TURNS = "turns"
 """Column of a state with the quaternions of the nodes; the first number is the real part minus 1,
@@ -182,6 +182,31 @@ def rotations_between(before: Array, now: Array) -> Array:
     v, real = a * q - b * p - np.cross(p, q), a * b + np.sum(p * q, axis=1, keepdims=True)
     sine = np.linalg.norm(v, axis=1, keepdims=True)
     return np.asarray(v * 2 * np.arctan2(sine, real) / np.where(sine > 0, sine, 1.0))
+
+
+def velocity_in_space(
+    numbering: DofNumbering, place: AttachmentPoint, velocities: Vectors, turns: Vectors
+) -> Array:
+    """Return velocities of a place, and angular velocities about axes of its node; (n, 6)."""
+    motion = values_at(numbering, place, velocities)
+    frames = turns_at(numbering, place, turns).as_matrix()
+    motion[:, :3] += np.einsum("nij,nj->ni", frames, np.cross(motion[:, 3:], arm(place)))
+    return motion
+
+
+def turned_further(numbering: DofNumbering, turns: Array, change: Array) -> Array:
+    """Return :data:`TURNS` after changes of the unknowns, which are Cayley vectors; (nodes, 4)."""
+    dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[: len(turns), 3:]
+    steps = Rotation.from_quat(np.pad(change[dofs] / 2, ((0, 0), (0, 1)), constant_values=1.0))
+    quaternions = (_rotations(turns) * steps).as_quat()
+    return np.asarray(np.roll(quaternions, 1, axis=1) - np.eye(4)[0])
+
+
+def by_rotation(numbering: DofNumbering, turns: Array) -> Array:
+    """Return the quaternions of :data:`TURNS` at the first rotations of nodes; (size, 4)."""
+    found: Array = np.zeros((numbering.size, 4))
+    found[np.vstack([numbering.dofs, numbering.dofs_of_bodies])[: len(turns), 3]] = turns
+    return found
 
 
 def rotation_vectors(turns: Array) -> Array:

@@ -177,11 +177,8 @@ class DofNumbering:
         self.size = len(order) + len(self.multipliers)
 
     def components(self, component: int) -> tuple[int, ...]:
-        """Return the degrees of freedom of a node for a component of :data:`COMPONENTS`.
-
-        In space the first component stands for all displacements, and the last for all rotations.
-        """
-        return {0: (0, 1, 2), 1: (), 2: (3, 4, 5)}[component] if self.width == 6 else (component,)
+        """Return the unknowns of a node for a component, see :meth:`Scene.components`."""
+        return self.scene.components(component)
 
     def agrees(self, numbering: DofNumbering) -> bool:
         """Return whether ``numbering`` has the same beams, points and degrees of freedom."""

@@ -256,20 +256,28 @@ def _rows(
     scene: Scene, acts: Callable[[Connector], bool], supports: Iterable[Support]
 ) -> Iterator[tuple[object, Row]]:
     """Iterate over (owner, constraint) for connectors that ``acts`` selects, and ``supports``."""
+    d = 3 if scene.in_space else 2  # number of displacements
     for connector in filter(acts, scene.all_connectors):
         scale = 1.0 if connector.is_rotation else 1 / scene.size
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
-        yield connector, [(node(end), (x, y, z * scale)) for end, (x, y, z) in ends]
+        yield connector, [(node(end), (*x[:d], *(y * scale for y in x[d:]))) for end, x in ends]
     for support in supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
         turned = (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)
         for component in support.held:
-            yield support, [(node(support.place), turned[component])]
+            for unit in _units(scene, component) if d == 3 else [turned[component]]:
+                yield support, [(node(support.place), unit)]
+
+
+def _units(scene: Scene, component: int) -> list[Sequence[float]]:
+    """Return the factors of (u, v, size ψ) of the motions that a component stands for."""
+    number = 6 if scene.in_space else 3
+    return [tuple(float(i == k) for i in range(number)) for k in scene.components(component)]
 
 
 def _free_motions(scene: Scene, acts: Callable[[Connector], bool]) -> Array:
     """Return a basis of the rigid motions that :func:`_constraints` allow, in columns."""
-    return _null_space(_constraints(scene, acts), 3 * len(scene.parts))
+    return _null_space(_constraints(scene, acts), (6 if scene.in_space else 3) * len(scene.parts))
 
 
 def _constraints(
@@ -277,33 +285,38 @@ def _constraints(
     acts: Callable[[Connector], bool],
     also: Iterable[tuple[AttachmentPoint, int]] = (),
 ) -> list[Entries]:
-    """Return the constraints on rigid motions (u, v, size ψ) of beams and bodies.
+    """Return the constraints on rigid motions of beams and bodies.
 
-    They are of joints, supports, connectors that ``acts`` selects and degrees of freedom in
-    ``also``, and of beams and places with works, because a work may hold them.
+    Rigid motions are (u, v, size ψ), in space (u, v, w, size times rotation vector).  Constraints
+    are of joints, supports, connectors that ``acts`` selects and degrees of freedom in ``also``,
+    and of beams and places with works, because a work may hold them.
     """
-    unit = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     rows: list[Row] = [
-        [(first, [-x for x in unit[component]]), (second, unit[component])]
+        [(first, [-x for x in unit]), (second, unit)]
         for (first, component), *others in scene.shared_by_joints
         for second, _ in others
+        for unit in _units(scene, component)
     ]
     rows += (row for _, row in _rows(scene, acts, scene.supports))
     worked = [x for work in scene.works for x in work.places]
     worked += [beam.start for work in scene.works for beam in work.on(scene.beams)]
     also = (*also, *((place, component) for place in worked for component in range(3)))
-    rows += ([(node(place), unit[component])] for place, component in also)
+    rows += ([(node(place), unit)] for place, c in also for unit in _units(scene, c))
+    number = 6 if scene.in_space else 3
     bases: dict[Member | Body, tuple[int, Point]] = {
-        part: (3 * i, base_of(part).point) for i, part in enumerate(scene.parts)
+        part: (number * i, base_of(part).point) for i, part in enumerate(scene.parts)
     }
 
     def entries(moved: Node, factors: Sequence[float]) -> Entries:
         if moved is GROUND:
             return []
-        px, py = moved.center if isinstance(moved, Body) else moved.point
-        first, (cx, cy) = bases[moved if isinstance(moved, Body) else moved.beam]
-        x, y = (px - cx) / scene.size, (py - cy) / scene.size
-        u, v, ψ = factors
+        point = moved.center if isinstance(moved, Body) else moved.point
+        first, base = bases[moved if isinstance(moved, Body) else moved.beam]
+        arm = [(p - c) / scene.size for p, c in zip(point, base, strict=True)]
+        if number == 6:
+            turning = np.add(factors[3:], np.cross(arm, factors[:3])).tolist()
+            return [*enumerate([*factors[:3], *turning], first)]
+        (x, y), (u, v, ψ) = arm, factors
         return [(first, u), (first + 1, v), (first + 2, ψ + v * x - u * y)]
 
     return [[entry for end in row for entry in entries(*end)] for row in rows]
@@ -345,16 +358,25 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
     kinds = [f"beam {i}" for i in range(len(scene.beams))]
     kinds += [f"body {i}" for i in range(len(scene.bodies))]
     texts = []
-    motions = (mode / np.abs(mode).max()).reshape(-1, 3)
-    for kind, part, (u, v, ψ) in zip(kinds, scene.parts, motions, strict=True):
-        if abs(ψ) >= 1e-6:
-            cx, cy = base_of(part).point
-            center = (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
-            x, y = (scene.size * round(c / scene.size, 9) + 0.0 for c in center)
-            texts.append(f"{part.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
-        elif max(abs(u), abs(v)) > 1e-6:
-            texts.append(f"{part.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
+    motions = (mode / np.abs(mode).max()).reshape(len(kinds), -1)
+    for kind, part, motion in zip(kinds, scene.parts, motions, strict=True):
+        d = len(motion) // 2 + len(motion) % 2  # number of displacements
+        u, ψ = motion[:d], motion[d:]
+        turns, base = np.linalg.norm(ψ), base_of(part).point
+        if turns >= 1e-6:
+            away = np.cross(ψ, u) if d == 3 else np.array([-u[1], u[0]]) * ψ
+            at = np.array(base) + scene.size * away / turns**2
+            center = scene.size * np.round(at / scene.size, 9) + 0.0
+            axis = np.round(ψ / turns, 9) + 0.0
+            about = f"the axis {_listed(axis)} through " if d == 3 else ""
+            texts.append(f"{part.name} ({kind}) can turn about {about}{_listed(center, 4)}")
+        elif np.abs(u).max() > 1e-6:
+            texts.append(f"{part.name} ({kind}) can shift along {_listed(np.round(u, 9) + 0.0)}")
     return texts
+
+
+def _listed(vector: Array, digits: int = 3) -> str:
+    return f"({', '.join(f'{x:.{digits}g}' for x in vector)})"
 
 
 def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
@@ -399,7 +421,7 @@ def warn_of_held_motions(scene: Scene) -> None:
     The gradient of such a motion is a combination of constraints of joints between the same places,
     or vanishes at all free degrees of freedom.
     """
-    if not scene.connectors:
+    if not scene.connectors or scene.in_space:
         return
     moving = [(node(s.place), c) for s in scene.supports for c in s.moving]
     fixed = _fixed(scene) - {scene.representatives[dof] for dof in moving}

@@ -215,6 +215,13 @@ class Scene(Record, Rich):
         if d == 3:
             require_space(self)
 
+    def components(self, component: int) -> tuple[int, ...]:
+        """Return the unknowns of a node for a component u, v or ψ: 0, 1 or 2.
+
+        In space the first component stands for all displacements, and the last for all rotations.
+        """
+        return {0: (0, 1, 2), 1: (), 2: (3, 4, 5)}[component] if self.in_space else (component,)
+
     def require_plane(self, what: str) -> None:
         """Raise :class:`ModelError` if points of the scene have three coordinates."""
         if self.in_space:

@@ -23,6 +23,7 @@ from ufl_beam.discretization.cells_in_space import (
     momentum_in_space,
     rotation_vectors,
     turns_at,
+    velocity_in_space,
 )
 from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
 from ufl_beam.discretization.function_spaces import Fields
@@ -358,10 +359,7 @@ class States:
             raise ArgumentError("velocity: the run was static; there is none")
         if not self.scene.in_space:
             return velocity_at(self.numbering, place, self.column("q"), v)
-        motion = values_at(self.numbering, place, v)
-        turns = turns_at(self.numbering, place, self.column(TURNS))
-        motion[:, :3] += turns.apply(np.cross(motion[:, 3:], arm(place)))
-        return motion
+        return velocity_in_space(self.numbering, place, v, self.column(TURNS))
 
     def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""

@@ -11,6 +11,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.blocks.work_checks import require_works
 from ufl_beam.caches import no_garbage_collection
+from ufl_beam.discretization.cells_in_space import TURNS
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.model_warnings import (
     warn_of_far_points,
@@ -68,7 +69,7 @@ def checked_numbering(
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if scene.in_space:
-        pass
+        free_motion = "" if has_inertia(scheme) else require_no_mechanism(scene)
     elif has_inertia(scheme):
         require_inertia(scene)
         warn_of_masses(scene)
@@ -88,7 +89,7 @@ def checked_numbering(
         if len(stages_of(scheme)) > 1:
             require_smooth(scene, scheme)
         warn_of_warping(scene)
-        return DofNumbering(scene, mesh), ""
+        return DofNumbering(scene, mesh), free_motion
     require_works(scene, mesh.degree, scheme)
     require_independent(scene)
     warn_of_far_points(scene)
@@ -166,7 +167,6 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
         return solution
     scene, numbering = solution.scene, solution.numbering
     owners = [numbering.middle(int(cell)).beam.name for cell in numbering.inelastic_cells[:1]]
-    owners += ["a scene in space"] * scene.in_space
     owners += [str(c) for c in scene.all_connectors if remembers(c.law)]
     owners += [str(x) for x in scene.works if isinstance(x, Effect) and x.statement.state]
     if owners:
@@ -179,9 +179,11 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
     part._blocks = solution.subset(0, n + 1)._blocks
     reactions = np.zeros(numbering.size)
     for support, forces in zip(scene.supports, part.column("reactions")[:,][-1], strict=True):
-        held = [*support.held]
+        held = [k for c in support.held for k in numbering.components(c)]
         reactions[numbering.node(support.place)[held]] = forces[held]
     part.internal = {"reactions": reactions} if np.isfinite(reactions).all() else {}
+    if scene.in_space:
+        part.internal[TURNS] = part.column(TURNS)[:,][-1]
     return part
 
 

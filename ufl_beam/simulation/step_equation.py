@@ -20,17 +20,18 @@ from ufl_beam.blocks.connector_terms import connector_terms
 from ufl_beam.blocks.damping import second_differences, tangent_damping, viscosity
 from ufl_beam.blocks.loads import load_blocks
 from ufl_beam.blocks.material_points import create_entries
+from ufl_beam.blocks.nodes_in_space import put_turns
 from ufl_beam.blocks.spatial_beams import (
     CellsInSpace,
     InelasticCellsInSpace,
     bodies_in_space,
     viscosity_in_space,
 )
-from ufl_beam.blocks.spatial_loads import LoadsInSpace, loads_in_space
+from ufl_beam.blocks.spatial_loads import loads_in_space
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.cells_in_space import turns_at
+from ufl_beam.discretization.cells_in_space import TURNS, by_rotation, turns_at
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
@@ -67,7 +68,8 @@ class StepEquation:
         fields: Fields on the cells of this process.
         ledger: Energies of this process.
         controllers: Forces of controllers and limits of friction in the step.
-        beams: Terms of cells; ``inelastic``, the terms of cells with material points, come first.
+        beams: Terms of cells in the plane; ``inelastic``, those with material points, come first.
+        cells: Terms of all cells.
         connector_terms: Terms of connectors, grouped by kind.
         loads: Terms of loads and works.
         supports: Prescribed motions and reactions.
@@ -164,7 +166,7 @@ class StepEquation:
         self.remembering: list[Any] = [*own, *self.connector_terms]
         self.inner: list[Term] = [*self.beams, *self.in_space, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
-        self._predicting: list[Any] = [*self.beams, *self.in_space]
+        self.cells: list[Any] = [*self.beams, *self.in_space]
         self.terms: list[Term] = [*self.inner, *self.others]
         self.imposed = [x for x in self.beams if x.imposed]
         self._fill_c(search, switched)
@@ -191,7 +193,7 @@ class StepEquation:
         product, cells = pop("add_step_tangent"), pop("add_cells")
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
-        predicted = [x.prediction for x in self._predicting if x.prediction is not None]
+        predicted = [x.prediction for x in self.cells if x.prediction is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -261,7 +263,8 @@ class StepEquation:
         """
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
-        for term in self.remembering:
+        given = {*self.nodes_in_space} if TURNS in internal else set()
+        for term in (x for x in self.remembering if x not in given):
             term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
         for cells in () if same else self.in_space:
             cells.forget_last_step()
@@ -269,6 +272,8 @@ class StepEquation:
         for load in self.loads:
             if isinstance(load, Block) and load.remembers:
                 load.keep_states(archive)
+        if TURNS in internal:
+            self._put_turns(by_rotation(self.subdomain.numbering, internal[TURNS]))
         if "reactions" in internal:
             self.supports.carry_on(archive, q)
         if self.nodes_in_space and not same:
@@ -292,12 +297,15 @@ class StepEquation:
             return np.asarray(turns_at(numbering, support.place, turns).as_rotvec()[0])
 
         self.supports.find_angles(rotation_vector, t)
-        at_dofs: Array = np.zeros((len(q), 4))
-        at_dofs[np.vstack([numbering.dofs, numbering.dofs_of_bodies])[:, 3]] = turns[0]
+        self._put_turns(by_rotation(numbering, turns[0]))
         for load in self.loads:
-            if isinstance(load, LoadsInSpace):
-                load.take_turns(at_dofs)
+            if isinstance(load, Block) and load.remembers:
                 load.carry_on(t, q, None, None)
+
+    def _put_turns(self, turns: Array) -> None:
+        """Let all terms begin with quaternions at the rotations of all nodes; (size, 4)."""
+        for term in (*self.remembering, *self.loads):
+            put_turns(term, turns[self.subdomain.dofs])
 
     def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""
@@ -333,7 +341,7 @@ class StepEquation:
                     begin(data, c, ffi.NULL, ffi.NULL)
             for beams in imposed:
                 beams.impose(c)
-        for cells in self._predicting:
+        for cells in self.cells:
             if cells in some and (predicted := cells.prediction) is not None:
                 predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
@@ -344,9 +352,9 @@ class StepEquation:
         """
         short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         step = Step.create(self.scheme, 0.0, short, short, q)
-        self.begin(step._replace(fraction=0.0), self._predicting)  # imposed strains remain
-        for beam in self._predicting:
-            beam.add_residual(q, forces)
+        self.begin(step._replace(fraction=0.0), self.cells)  # imposed strains remain
+        for cells in self.cells:
+            cells.add_residual(q, forces)
         if t is not None:
             step = Step.create(self.scheme, t, t + 1.0, t + 1.0, q)
             self.begin(step._replace(load_time=t, motion_time=t), self.connector_terms)
@@ -444,7 +452,7 @@ class StepEquation:
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
         for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
-            beam_work = sum(beams.tangent_work(q, x, y) for beams in self.beams)
+            beam_work = sum(cells.tangent_work(q, x, y) for cells in self.cells)
             works[i] = beam_work + times(x) @ y
         return works
 
@@ -457,8 +465,8 @@ class StepEquation:
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(column) for column in (X[:, i], Y[:, j]))
-            works[0, i, j] = sum(beams.tangent_work(q, x, y) for beams in self.beams)
-            works[1, i, j] = sum(beams.tangent_work(q, x, y, u) for beams in self.beams)
+            works[0, i, j] = sum(cells.tangent_work(q, x, y) for cells in self.cells)
+            works[1, i, j] = sum(cells.tangent_work(q, x, y, u) for cells in self.cells)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
             for term in (*self.connector_terms, *self.loads):

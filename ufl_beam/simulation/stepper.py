@@ -363,7 +363,9 @@ class Stepper(StateView):
         x = np.zeros((self.numbering.size, vectors.shape[1]))
         x[free] = vectors
         dofs = [self.numbering.node(base_of(part)) for part in self.scene.parts]
-        motions: Array = x[np.array(dofs)] * [[1.0], [1.0], [self.scene.size]]
+        d = self.numbering.displacements
+        units = np.where(np.arange(self.numbering.width) < d, 1.0, self.scene.size)
+        motions: Array = x[np.array(dofs)] * units[:, None]
         return motions.reshape(-1, x.shape[1])
 
     # -- steps ---------------------------------------------------------------------------------
@@ -383,7 +385,7 @@ class Stepper(StateView):
         return self._trial(solved)
 
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
-        """Solve for a step and its load factor, which is stored as the time at its end.
+        """Solve for a step and, with a ``border``, its load factor: the time at its end.
 
         ``step`` has the times of the initial guess.  The guess is in the axes of supports.  With
         ``hold``, a hinge or spring that did not open further in the last step keeps its opening if
@@ -395,7 +397,7 @@ class Stepper(StateView):
             trial = c.step
             trial.t0, trial.t1, trial.dt = step.t0, step.t1, step.dt
             trial.load_time, trial.motion_time = step.load_time, step.motion_time
-            trial.fraction = trial.at = 1.0
+            trial.fraction, trial.at = step.fraction, step.at
             trial.ratio, trial.q0, trial.q_before = 0.0, c.q, c.prediction.q_before
             ffi.memmove(c.guess, doubles(guess), guess.nbytes)
             solved = lib.solve_begun_step(c, hold)
