@@ -348,7 +348,7 @@ def test_dampers_in_series_with_springs():
         bodies, last = [*bodies, body, plug], body.middle
     push = ub.PointLoad(last, force=(1.0, 0))
     scene = ub.Scene(bodies=bodies, connectors=connectors, supports=held, loads=[push])
-    outputs = [("displacement", place, "u") for place in (last, plug.middle)]
+    outputs = [(kind, x, "u") for kind in ("displacement", "velocity") for x in (last, plug.middle)]
     model = model_of(scene, [push], outputs)
     expected = np.linalg.eigvals(model.state_space()[0])
     expected = np.sort_complex(expected[expected.imag >= 0])
