@@ -460,6 +460,26 @@ def test_response_at_an_exponent():
     free = replace(SCENE, supports=(), damping=())
     with raises("s = 0", "is an exponent of the model"):
         model_of(free).reduced(4).frequency_response(0.0)
+    scene, pull = block(ub.Spring(4.0))
+    with raises("s = 0+2j is an exponent of the model"):
+        model_of(scene, [pull], [MOVED]).frequency_response(2.0)
+
+
+def test_a_motion_without_mass_and_stiffness_is_refused():
+    """A spring and a law of force -4 x, between the ground and a body without mass."""
+    scene, pull = block(ub.Spring(4.0))
+    plug = ub.Body((1, 0), mass=0.0, inertia=0.0, name="plug")
+    held = ub.PrescribedDisplacement(plug.middle, v=0.0, psi=0.0)
+    laws = ub.Spring(4.0), ub.ForceLaw(lambda x, rate: -4 * x)
+    pair = [ub.Slide(ub.ground(0, 0), plug.middle, law, axis=(1, 0)) for law in laws]
+    scene = replace(scene, bodies=[MASS, plug], supports=[*scene.supports, held],
+                    connectors=[*scene.connectors, *pair])  # fmt: skip
+    model = model_of(scene, [pull], [MOVED])
+    with raises("neither mass, damper nor stiffness determines u plug (1, 0)"):
+        model.state_space()
+    for compute in (lambda: model.reduced(1), lambda: ub.modes(scene, 1)):
+        with raises("neither mass nor stiffness determines some motion in this state"):
+            compute()
 
 
 def test_state_must_be_an_equilibrium():
@@ -496,6 +516,8 @@ SPRING = ub.Slide(ub.ground(2, 0), BEAM.end, ub.Spring(1.0), axis=(0, 1))
 JACK = ub.Turn(ub.ground(0, 0), BEAM.start, ub.PrescribedForce(still))
 ROLLER = ub.Roller(BEAM.end, along=(0, 1))
 PIN = ub.Revolute(BEAM.end, ARM.start)
+CURVED = ub.Guided(ARM.at(0.5), lambda s: (2.5 + s, s))
+SLIDER = ub.Prismatic(ub.ground(3, 0), ARM.end, axis=(0, 1))
 AT_FOOT = ub.PointLoad(BEAM.start, force=(1.0, 0))
 
 
@@ -541,10 +563,13 @@ def test_inputs_that_are_refused(inputs, message):
         (("joint", SPRING), "must be a Joint"),
         (("joint", PIN), "shares unknowns"),
         (("joint", ub.Revolute(BEAM.end, ARM.start)), "is not in the scene"),
+        (("joint", CURVED), "the force of a guide is no output"),
+        (("joint", SLIDER, "moment"), "shares its rotation; its moment is not known"),
     ],
 )
 def test_outputs_that_are_refused(output, message):
-    scene = ub.Scene([BEAM, ARM], supports=[FOOT], joints=[PIN], loads=[PUSH])
+    joints = [PIN, CURVED, SLIDER]
+    scene = ub.Scene([BEAM, ARM], supports=[FOOT], joints=joints, loads=[PUSH])
     with raises(message):
         model_of(scene, outputs=[output])
 

@@ -13,6 +13,7 @@ from scipy.sparse import block_array, csr_array, diags_array, eye_array
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Complex
+from ufl_beam.errors import ArgumentError
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import DENSE, ROUND_OFF, SHIFT, ZERO
 
@@ -61,7 +62,12 @@ class SmallMotions(Linearization):
         each work may be round-off, and the least squared frequency of the other motions.
         """
         solve = partial(eigensolvers.linear, matrix, self.M, n, most=self.most, definite=definite)
-        values, x = solve(shift=-SHIFT * self.squares.min())
+        try:
+            values, x = solve(shift=-SHIFT * self.squares.min())
+        except np.linalg.LinAlgError:
+            raise ArgumentError(
+                "neither mass nor stiffness determines some motion in this state; give it mass"
+            ) from None
         works, zero = self._works(x.real)
         first = np.abs(values[~zero].real).min(initial=self.squares.max())
         if zero.any():

@@ -153,8 +153,6 @@ class Section(Record):
             return ()
         stiffness, bending = np.array([self.EA, self.GA, self.EI]), self.bending
         if self.interaction is not None:
-            if hinge is not None:
-                raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
             inelastic = np.array([name in self.interaction.resultants for name in "NVM"])
             chosen, laws = [inelastic], [self.interaction]
         else:
