@@ -116,6 +116,14 @@ PARTS = [
     (lambda: ub.Roller(END, along=(0, 0)), "Roller at girder.end...no direction"),
     (lambda: ub.PrescribedDisplacement(END), "nothing...at least one of u, v, psi"),
     (lambda: ub.Revolute(END), "Revolute: a joint needs at least two places"),
+    (lambda: ub.Spherical(END, BESIDE), "ball joints are in space; use Revolute in the plane"),
+    (lambda: scene(bodies=[ub.ground(0, 0).body]), "the ground is in every scene; leave it out"),
+    (lambda: ub.Body((0, 0), mass=1.0, inertia=(1, 1, 1)), "inertia in the plane is a number"),
+    (lambda: HUB.at(0, 0, 0), "hub.at(0.0, 0.0, 0.0): the centre has 2 coordinates"),
+    (
+        lambda: ub.Scene([ub.Beam((0, 0, 0), (1, 0, 0), in_fibres(), name="mast")]),
+        "mast: inelastic laws and hinges are for scenes in the plane",
+    ),
 ]
 
 
@@ -334,6 +342,8 @@ YIELDING = ub.Beam((0, 0), (1, 0), ub.Section(1e4, 1e4, 100.0, bending=ub.Elasto
 YIELDS = ub.Scene([YIELDING], supports=[ub.Clamped(YIELDING.start)])
 OF_OTHERS = "start: the solution has other beams or another mesh"
 RUNS = [
+    (lambda: run(CLAMPED, ub.Static(), dt=ub.Adaptive(1e-3)), "a static scheme has none; give a"),
+    (lambda: run(record=ub.History("a\0.csv", [END])), "output a...cannot be written: ...null"),
     (lambda: run(t=(1.0, 1.0)), "the end t[1] = 1 must come after the beginning 1"),
     (lambda: run(record=ub.History("a.csv", [STRAY.end])), "stray.end (1, 0): stray is not in the"),
     # the start
