@@ -86,6 +86,7 @@ PARTS = [
     (lambda: st.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: ...do not fit"),
     (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), "nu = 0.6 must lie in (-1, 0.5]"),
     # laws
+    (lambda: ub.Spring(1.0, st.Mander(30.0, 2e-3)), "Spring: Mander: E = 1 must be at least 1.02"),
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),
     (lambda: in_fibres(bending=STEEL_LAW), "Section: a law bending beside fibres"),
     (lambda: in_fibres(shear=STEEL_LAW), "Section: a law shear beside fibres...elastic"),
