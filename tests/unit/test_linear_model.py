@@ -270,6 +270,25 @@ def test_moving_supports_are_inputs_and_outputs():
     np.testing.assert_allclose(slow.real, [0.0, 1.0, 2.0], atol=1e-6)
 
 
+def test_force_of_a_link_on_a_body_that_has_turned():
+    """[closed] Balance of the body: the force of the link is m s² u + k u - F."""
+    m, k, F, s = 2.0, 3.0, (1.0, 0.5), 0.3 + 2.0j
+    body, pivot = ub.Body((0, -2), mass=m, inertia=0.3), ub.ground(0, -2)
+    link = ub.Link(ub.ground(0, 0), body.at(0.3, -1.2))
+    springs = [ub.Slide(pivot, body.middle, ub.Spring(k), axis=axis) for axis in ((1, 0), (0, 1))]
+    springs.append(ub.Turn(pivot, body.middle, ub.Spring(5.0)))
+    hold = ub.PointLoad(body.middle, force=(6.0, -9.0), moment=1.0, amplitude=lambda t: min(t, 1))
+    push = ub.PointLoad(body.middle, force=F, amplitude=still)
+    scene = ub.Scene(bodies=[body], joints=[link], connectors=springs, loads=[hold, push])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    assert abs(at.displacement(body.middle)[-1, 2]) > 0.3
+    outputs = [("joint", link, c) for c in "xy"] + [("displacement", body.middle, c) for c in "uv"]
+    force, motion = (
+        model_of(scene, [push], outputs, at=at).transfer_function(s)[:, 0, 0].reshape(2, 2)
+    )
+    np.testing.assert_allclose(force, (m * s**2 + k) * motion - F, rtol=1e-9)
+
+
 def test_large_model_is_sparse_and_reducible():
     scene, model = pushed(SECTION, cells=800)
     with raises("4800 states are too many", "reduced(n)"):
