@@ -86,6 +86,7 @@ PARTS = [
     (lambda: st.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: ...do not fit"),
     (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), "nu = 0.6 must lie in (-1, 0.5]"),
     # laws
+    (lambda: ub.Spring(1.0, st.Mander(30.0, 2e-3)), "Spring: Mander: E = 1 must be at least 1.02"),
     (lambda: ub.ElastoPlastic(1.0, isotropic=-2.0), "isotropic = -2 must not...use Softening("),
     (lambda: in_fibres(bending=STEEL_LAW), "Section: a law bending beside fibres"),
     (lambda: in_fibres(shear=STEEL_LAW), "Section: a law shear beside fibres...elastic"),
@@ -116,6 +117,14 @@ PARTS = [
     (lambda: ub.Roller(END, along=(0, 0)), "Roller at girder.end...no direction"),
     (lambda: ub.PrescribedDisplacement(END), "nothing...at least one of u, v, psi"),
     (lambda: ub.Revolute(END), "Revolute: a joint needs at least two places"),
+    (lambda: ub.Spherical(END, BESIDE), "ball joints are in space; use Revolute in the plane"),
+    (lambda: scene(bodies=[ub.ground(0, 0).body]), "the ground is in every scene; leave it out"),
+    (lambda: ub.Body((0, 0), mass=1.0, inertia=(1, 1, 1)), "inertia in the plane is a number"),
+    (lambda: HUB.at(0, 0, 0), "hub.at(0.0, 0.0, 0.0): the centre has 2 coordinates"),
+    (
+        lambda: ub.Scene([ub.Beam((0, 0, 0), (1, 0, 0), in_fibres(), name="mast")]),
+        "mast: inelastic laws and hinges are for scenes in the plane",
+    ),
 ]
 
 
@@ -334,6 +343,8 @@ YIELDING = ub.Beam((0, 0), (1, 0), ub.Section(1e4, 1e4, 100.0, bending=ub.Elasto
 YIELDS = ub.Scene([YIELDING], supports=[ub.Clamped(YIELDING.start)])
 OF_OTHERS = "start: the solution has other beams or another mesh"
 RUNS = [
+    (lambda: run(CLAMPED, ub.Static(), dt=ub.Adaptive(1e-3)), "a static scheme has none; give a"),
+    (lambda: run(record=ub.History("a\0.csv", [END])), "output a...cannot be written: ...null"),
     (lambda: run(t=(1.0, 1.0)), "the end t[1] = 1 must come after the beginning 1"),
     (lambda: run(record=ub.History("a.csv", [STRAY.end])), "stray.end (1, 0): stray is not in the"),
     # the start

@@ -211,6 +211,32 @@ def test_interpolation_at_fourth_order_is_of_sixth_order():
     assert np.abs(at.computed(coarse) - tip(fine)).max() < 1.5 * steps
 
 
+def controlled(a, b):
+    """The forces of `pushed` by a controller, which has no derivatives; none of less than -3.5."""
+    if b < -3.5:
+        raise ub.ModelError("too large")
+    beam = ub.Beam((0, 0), (1, 0), STEEL, cells=1, name="beam")
+    law = ub.Controller(lambda now: a * now.t + b * now.t**2)
+    pull = ub.Slide(ub.ground(1, 0), beam.end, law, axis=(1, 0))
+    return clamped(beam, connectors=[pull])
+
+
+@pytest.mark.parametrize(("b", "start"), [(-3.0, 1.0), (-3.0, 2.0), (-3.4999999, -3.0)])
+def test_effects_without_derivatives_have_differences_of_runs(b, start):
+    """Estimates of a linear problem; one-sided at the bound 2 of b, and where runs fail."""
+
+    def forces(**at):
+        run = ub.simulate(controlled(**at), ub.Static(), t=(0, 1), dt=0.025, progress=False)
+        return force(run)
+
+    measured = measurement(forces(a=2.0, b=b), sigma=SIGMA)
+    result = fit(measured, {"a": (1.0, -10.0, 10.0), "b": (start, -10.0, 2.0)}, controlled)
+    assert list(result.parameters.values()) == pytest.approx([2.0, b], abs=1e-5)
+    columns = np.column_stack([forces(a=1.0, b=0.0), forces(a=0.0, b=1.0)]) / SIGMA
+    deviations = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    np.testing.assert_allclose(result.half_widths / norm.ppf(0.975), deviations, rtol=1e-5)
+
+
 def test_a_first_row_without_a_value_is_left_out():
     def acceleration(run):
         return run.acceleration(run.scene["beam"].end)[:, 0]

@@ -4,7 +4,10 @@
 import errno
 import itertools
 import math
+import operator
 import resource
+from functools import partial
+from types import MethodType, SimpleNamespace
 
 from mpi4py import MPI
 
@@ -185,14 +188,14 @@ def test_random_generators_go_on(path):
         used = np.random.default_rng(1)
         return used, steered(lambda now: 0.1 * used.normal())
 
-    other = np.random.Generator(np.random.MT19937(2))
+    other, legacy = np.random.Generator(np.random.MT19937(2)), np.random.RandomState(3)
     used, frame = noisy()
-    run(path, frame, also=[other])
-    expected = used.normal(), other.normal()
+    run(path, frame, also=[other, legacy])
+    expected = [x.normal() for x in (used, other, legacy)]
     used, frame = noisy()
     other.normal(size=7)
-    run(path, frame, also=[other])
-    assert (used.normal(), other.normal()) == expected
+    run(path, frame, also=[other, legacy])
+    assert [x.normal() for x in (used, other, legacy)] == expected
 
 
 class Odd(Telling):
@@ -263,6 +266,13 @@ def test_functions_are_described_by_what_they_use(monkeypatch):
     assert difference(described(lambda t: t), described(lambda t: t + 1)) == (
         "the function x has changed"
     )
+    for make, name in (
+        (lambda x: partial(operator.add, x), "x.args[0]"),
+        (lambda x: MethodType(waves, SimpleNamespace(size=x)), "x.self.size"),
+    ):
+        found = difference(described(make(2.0)), described(make(1.0)))
+        assert found == f"{name} is 2.0, in the file 1.0"
+    assert difference({}, {"x": "1.0"}) == "x is 1.0 in the file, and there is none now"
 
 
 def test_what_contains_itself_and_arrays_and_dicts():

@@ -389,6 +389,9 @@ def test_quantities_that_do_not_fit():
             run.of(quantity)
     with pytest.raises(ZeroDivisionError):  # errors of a user's function keep their kind
         run.of(lambda s: 1 / 0)
+    fourth = ub.differentiate(swinging, {"k": 20.0}, ub.EnergyMomentum(order=4), **SHORT)
+    with raises("of: this quantity needs section forces", "use order=2"):
+        fourth.of(lambda s: s.energy.state["stored"])
 
 
 def test_a_beam_of_another_call():

@@ -230,12 +230,20 @@ def test_bad_input_is_refused():
     place = ub.Beam((0, 0), (1, 0), SECTION, name="arm").end
     elsewhere = st.HotSpot(place, stress=lambda N, V, M: M)
     single = st.Fatigue(st.HotSpot(beam.start, stress=lambda N, V, M: M[0]), CURVE)
+    pair = st.Fatigue([st.HotSpot(beam.at(s), stress=lambda N, V, M: M) for s in (0, 1)], CURVE)
+    run(scene, pair, t=(0, 0.01))
     for make, *words in (
         (lambda: st.SNCurve(range=1.0, knee=5e6, limit=1e6), "limit = 1e+06 cycles lies before"),
         (lambda: ub.Extremes().section_forces(beam), "Extremes: nothing was run"),
         (lambda: single.cycles(elsewhere), "nothing was counted at arm.end"),
         (lambda: run(scene, st.Fatigue(elsewhere, CURVE)), "arm is not in the scene"),
         (lambda: run(scene, single), "mast.start ", " a finite number for each"),
+        (lambda: ub.plot(pair, "cycles"), "give one of the 2 hot spots"),
+        (
+            lambda: ub.plot(pair, "cycles", pair.spots[0]),
+            "the stress at mast.start",
+            "never turned",
+        ),
     ):
         with raises(*words):
             make()

@@ -81,6 +81,24 @@ def test_menegotto_pinto_over_random_paths(steel, scheme):
     assert lost.max() > 1.0
 
 
+def test_the_dissipation_of_small_steps_is_the_area_of_the_loops():
+    """[calc] Second order: half the step, a quarter of the error; 1e-6 by extrapolation."""
+
+    def paths(n):
+        return 0.05 * np.interp(np.arange(1, 4 * n + 1) / n, range(5), [0, 1, -0.4, 0.7, 0.6])
+
+    def lost(n):
+        law = st.MenegottoPinto(3.0, 0.02)
+        return followed(law, paths(n)[:, None])[1].dissipated()[0][0] / LENGTH
+
+    coarse, middle, fine = (lost(n) for n in (200, 400, 800))
+    strains = paths(6400)[:, None]
+    stresses = np.array(steel02(strains[:, 0], C, 3.0, 0.02))[:, None]
+    exact = work_by_means(strains, stresses)[0] - stresses[-1, 0] ** 2 / (2 * C)
+    assert 3.8 < (coarse - middle) / (middle - fine) < 4.2
+    assert (4 * fine - middle) / 3 == pytest.approx(exact, rel=1e-6)
+
+
 def test_errors_of_equilibrium_are_no_reversals():
     """Steps of 1e-9 yield strains to and fro leave the branch of yielding steel."""
     law, far = st.MenegottoPinto(3.0, 0.02), 0.05

@@ -279,6 +279,7 @@ def braked(EI):
             "the history is not finite at t = 0 s",
         ),
         ({"of": lambda s: s.energy.state["stored"]}, "forces or energies; use differentiate"),
+        ({"of": lambda s: np.cumsum(tip(s))}, "depend on motions at other times; put the part"),
         ({"model": braked}, "Coulomb has no derivatives"),
     ],
 )

@@ -116,6 +116,8 @@ def test_a_scene_with_everything_keeps_its_objects(by_mode):
 def test_wrong_imperfections():
     scene = pinned_column(1.0)
     column, mode = scene["column"], ub.modes(scene, 1)
+    whirling = replace(scene, connectors=[ub.Turn(ub.ground(0, 0), column.start, ub.Damper(0.1))])
+    whirl = ub.modes(whirling, 1)
     stray = ub.Beam((0, 0), (1, 0), SECTION)
     tee = ub.Beam((0, 1), (1, 1), SECTION)
     joined = ub.Scene([column, tee], joints=[ub.Rigid(column.at(0.5), tee.start)])
@@ -126,6 +128,7 @@ def test_wrong_imperfections():
         (joined, {"bow": {column: 0.1}}, "is between its ends; divide the beam"),
         (joined, {"mode": mode, "amplitude": 1.0}, "mode is of other beams"),
         (scene, {"mode": mode, "k": 1, "amplitude": 1.0}, "no shape 1"),
+        (whirling, {"mode": whirl, "amplitude": 1.0}, "mode 0 is complex; its phases differ"),
     ]:
         with raises(message):
             st.imperfect(of, **change)

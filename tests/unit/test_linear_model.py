@@ -270,6 +270,25 @@ def test_moving_supports_are_inputs_and_outputs():
     np.testing.assert_allclose(slow.real, [0.0, 1.0, 2.0], atol=1e-6)
 
 
+def test_force_of_a_link_on_a_body_that_has_turned():
+    """[closed] Balance of the body: the force of the link is m s² u + k u - F."""
+    m, k, F, s = 2.0, 3.0, (1.0, 0.5), 0.3 + 2.0j
+    body, pivot = ub.Body((0, -2), mass=m, inertia=0.3), ub.ground(0, -2)
+    link = ub.Link(ub.ground(0, 0), body.at(0.3, -1.2))
+    springs = [ub.Slide(pivot, body.middle, ub.Spring(k), axis=axis) for axis in ((1, 0), (0, 1))]
+    springs.append(ub.Turn(pivot, body.middle, ub.Spring(5.0)))
+    hold = ub.PointLoad(body.middle, force=(6.0, -9.0), moment=1.0, amplitude=lambda t: min(t, 1))
+    push = ub.PointLoad(body.middle, force=F, amplitude=still)
+    scene = ub.Scene(bodies=[body], joints=[link], connectors=springs, loads=[hold, push])
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    assert abs(at.displacement(body.middle)[-1, 2]) > 0.3
+    outputs = [("joint", link, c) for c in "xy"] + [("displacement", body.middle, c) for c in "uv"]
+    force, motion = (
+        model_of(scene, [push], outputs, at=at).transfer_function(s)[:, 0, 0].reshape(2, 2)
+    )
+    np.testing.assert_allclose(force, (m * s**2 + k) * motion - F, rtol=1e-9)
+
+
 def test_large_model_is_sparse_and_reducible():
     scene, model = pushed(SECTION, cells=800)
     with raises("4800 states are too many", "reduced(n)"):
@@ -348,7 +367,7 @@ def test_dampers_in_series_with_springs():
         bodies, last = [*bodies, body, plug], body.middle
     push = ub.PointLoad(last, force=(1.0, 0))
     scene = ub.Scene(bodies=bodies, connectors=connectors, supports=held, loads=[push])
-    outputs = [("displacement", place, "u") for place in (last, plug.middle)]
+    outputs = [(kind, x, "u") for kind in ("displacement", "velocity") for x in (last, plug.middle)]
     model = model_of(scene, [push], outputs)
     expected = np.linalg.eigvals(model.state_space()[0])
     expected = np.sort_complex(expected[expected.imag >= 0])
@@ -460,6 +479,26 @@ def test_response_at_an_exponent():
     free = replace(SCENE, supports=(), damping=())
     with raises("s = 0", "is an exponent of the model"):
         model_of(free).reduced(4).frequency_response(0.0)
+    scene, pull = block(ub.Spring(4.0))
+    with raises("s = 0+2j is an exponent of the model"):
+        model_of(scene, [pull], [MOVED]).frequency_response(2.0)
+
+
+def test_a_motion_without_mass_and_stiffness_is_refused():
+    """A spring and a law of force -4 x, between the ground and a body without mass."""
+    scene, pull = block(ub.Spring(4.0))
+    plug = ub.Body((1, 0), mass=0.0, inertia=0.0, name="plug")
+    held = ub.PrescribedDisplacement(plug.middle, v=0.0, psi=0.0)
+    laws = ub.Spring(4.0), ub.ForceLaw(lambda x, rate: -4 * x)
+    pair = [ub.Slide(ub.ground(0, 0), plug.middle, law, axis=(1, 0)) for law in laws]
+    scene = replace(scene, bodies=[MASS, plug], supports=[*scene.supports, held],
+                    connectors=[*scene.connectors, *pair])  # fmt: skip
+    model = model_of(scene, [pull], [MOVED])
+    with raises("neither mass, damper nor stiffness determines u plug (1, 0)"):
+        model.state_space()
+    for compute in (lambda: model.reduced(1), lambda: ub.modes(scene, 1)):
+        with raises("neither mass nor stiffness determines some motion in this state"):
+            compute()
 
 
 def test_state_must_be_an_equilibrium():
@@ -496,6 +535,8 @@ SPRING = ub.Slide(ub.ground(2, 0), BEAM.end, ub.Spring(1.0), axis=(0, 1))
 JACK = ub.Turn(ub.ground(0, 0), BEAM.start, ub.PrescribedForce(still))
 ROLLER = ub.Roller(BEAM.end, along=(0, 1))
 PIN = ub.Revolute(BEAM.end, ARM.start)
+CURVED = ub.Guided(ARM.at(0.5), lambda s: (2.5 + s, s))
+SLIDER = ub.Prismatic(ub.ground(3, 0), ARM.end, axis=(0, 1))
 AT_FOOT = ub.PointLoad(BEAM.start, force=(1.0, 0))
 
 
@@ -541,10 +582,13 @@ def test_inputs_that_are_refused(inputs, message):
         (("joint", SPRING), "must be a Joint"),
         (("joint", PIN), "shares unknowns"),
         (("joint", ub.Revolute(BEAM.end, ARM.start)), "is not in the scene"),
+        (("joint", CURVED), "the force of a guide is no output"),
+        (("joint", SLIDER, "moment"), "shares its rotation; its moment is not known"),
     ],
 )
 def test_outputs_that_are_refused(output, message):
-    scene = ub.Scene([BEAM, ARM], supports=[FOOT], joints=[PIN], loads=[PUSH])
+    joints = [PIN, CURVED, SLIDER]
+    scene = ub.Scene([BEAM, ARM], supports=[FOOT], joints=joints, loads=[PUSH])
     with raises(message):
         model_of(scene, outputs=[output])
 

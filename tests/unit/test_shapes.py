@@ -330,3 +330,7 @@ def test_sections_of_sectionproperties():
     assert (x.rhoA, x.rhoI) == pytest.approx((400.0, 400.0 * 3e8 / 4e9))
     with raises("x and y are not principal axes"):
         st.of_sectionproperties(analysed(product=1e6))
+    incomplete = analysed()
+    del type(incomplete).get_eic
+    with raises("calculate geometric and warping properties"):
+        st.of_sectionproperties(incomplete)

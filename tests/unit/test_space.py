@@ -127,6 +127,22 @@ def test_joints_have_the_same_motion_in_space(joint, scheme):
         same_motion(*both, scheme, turn, place)
 
 
+def test_a_slider_that_may_turn_moves_along_and_about_the_axis_only():
+    """[closed] A body on the ground: m u'' = F and J ω' = M along the axis, in Cayley steps."""
+    axis, m, J, dt = np.array([1.0, 2.0, 2.0]) / 3, 2.0, 0.5, 0.1
+    at, force, moment = (0.3, 0.1, -0.2), (1.0, -3.0, 2.0), (0.4, 0.3, 0.1)
+    body = ub.Body(at, mass=m, inertia=(J, J, J))
+    slot = ub.Prismatic(ub.ground(*at), body.middle, axis=axis, turning=True)
+    load = ub.PointLoad(body.middle, force=force, moment=moment)
+    scene = ub.Scene(bodies=[body], joints=[slot], loads=[load])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT, progress=False)
+    F, M = axis @ force, axis @ moment
+    changes = M / J * dt**2 * (np.arange(10) + 0.5)
+    turns = np.append(0.0, np.cumsum(2 * np.arctan(changes / 2)))
+    expected = np.outer(F * run.times**2 / (2 * m), axis), np.outer(turns, axis)
+    np.testing.assert_allclose(run.displacement(body.middle), np.hstack(expected), atol=1e-13)
+
+
 def same_motion(plane, space, scheme, turn, place=lambda scene: scene.beams[0].start):
     """Check that displacements and rotations are equal, and return both runs."""
     runs = [

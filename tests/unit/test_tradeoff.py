@@ -203,6 +203,16 @@ def test_no_run_is_done_twice(law):
         assert len({str(run.setting) for run in found.runs}) == len(found.runs)
 
 
+def test_a_budget_is_used_by_faster_options_of_newton(law):
+    """Their time is predicted from a run that compares them; two more find the result."""
+    other = ub.Newton(rtol=1e-6)
+    law(smooth, lambda at: 0.25 if at.newton == other else 1.0)
+    found = ask(newton=[STRICT, other], budget=3.0)
+    assert found.best.setting.newton == other
+    assert 0.8 * 3.0 <= found.best.seconds <= 3.0
+    assert len([run for run in found.runs if run.setting.newton == other]) <= 3
+
+
 @pytest.mark.parametrize("budget", [0.3, 1.0, 10.0])
 def test_a_budget_is_used(law, budget):
     law(smooth)

@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import raises
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
@@ -150,6 +151,8 @@ def test_a_ring_under_pressure(EA, cells, control):
     branches = [
         ub.follow(scene, ub.ArcLength(0.05), start=point.branch(k), steps=4) for k in (1, -1)
     ]
+    with raises("branch: sign = 2 must be 1 or -1"):
+        point.branch(2)
     one, other = (branch.displacement(top)[-1, 0] for branch in branches)
     assert one * other < 0
     assert min(abs(one), abs(other)) > 0.05

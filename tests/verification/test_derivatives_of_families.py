@@ -8,6 +8,7 @@ steps.  The derivatives of the motion must agree to 1e-7 of their largest value.
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -115,10 +116,10 @@ def machine(k=2e3, c=30.0, mass=3.0, length=1.0, limit=25.0, speed=2.0):
     )  # fmt: skip
 
 
-def swinging(length=2.0, height=0.2):
+def swinging(length=2.0, height=0.2, *, x=0.0, y=0.0):
     """A steel beam that falls about its pinned end; EA is 75 EI over a cell's length squared."""
     section = ub.Section.rectangle(b=0.1, h=height, E=210e9, nu=0.3, rho=7850.0)
-    beam = ub.Beam((0, 0), (length, 0), section, cells=4)
+    beam = ub.Beam((x, y), (x + length, y), section, cells=4)
     return ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()])
 
 
@@ -195,6 +196,16 @@ def test_derivatives_by_all_parameters(name):
     best, tolerance = best_errors(*FAMILIES[name])
     print(name, " ".join(f"{key} {error:.0e}" for key, error in best.items()))
     assert max(best.values()) < tolerance, best
+
+
+def test_derivatives_far_from_the_origin():
+    """They do not depend on the place of a scene; coordinates of 300 m have two digits less."""
+    at, near, far = {"length": 2.1, "height": 0.2}, swinging, partial(swinging, x=300.1, y=-200.1)
+    options = {"newton": TIGHT, "progress": False, "t": (0, 1), "dt": 0.01}
+    runs = (ub.differentiate(model, at, ub.EnergyMomentum(), **options) for model in (near, far))
+    expected, found = (run.of(history) for run in runs)
+    for p in range(2):
+        assert relative_error(found[..., p], expected[..., p]) < AGREE
 
 
 def test_tolerances_of_steps():

@@ -191,6 +191,8 @@ def test_a_limit_below_collapse():
     motions = [motion(seed) for seed in range(5)]
     found = analysis(motions, [3.5, 4.0, 4.5], limit=0.05)
     assert (found.fragility(0.0099).exceeded == (found.demand > 0.0099).sum(axis=0)).all()
+    with raises("fractiles: percent must be between 0 and 100"):
+        found.fractiles([50.0, 101.0])
     with raises("fragility: limit = 0.1 is above the limit of collapse, 0.05"):
         found.fragility(0.1)
 
@@ -216,6 +218,7 @@ SQUARE = motion(1).peak ** 2
             "if the motion is doubled; give an intensity that is proportional",
         ),
         ({"measure": lambda run: None}, "measure returned None, not finite numbers"),
+        ({"measure": lambda run: "far"}, "measure returned 'far', not finite numbers"),
     ],
 )
 def test_mistakes_are_named(options, words):

@@ -228,6 +228,7 @@ def test_a_loaded_state_softens_the_frame():
 MAST = ub.Beam((0, 0), (0, 3), ub.Section(EA=1e8, GA=1e8, EI=1e6, rhoA=10.0), cells=2)
 DAMPER = ub.Stretch(ub.ground(1, 3), MAST.end, ub.Damper(1e4))
 LIGHT = ub.Beam((0, 0), (0, 3), ub.Section(1e8, 1e8, 1e6, rhoA=0.0), cells=2)
+HELD = ub.Potential("soil", lambda q: q[0] ** 2)
 
 
 @pytest.mark.parametrize(
@@ -238,6 +239,7 @@ LIGHT = ub.Beam((0, 0), (0, 3), ub.Section(1e8, 1e8, 1e6, rhoA=0.0), cells=2)
         (clamped(MAST), lambda T: 0.0, ["must be positive"]),
         (clamped(MAST, connectors=[DAMPER]), spectrum, ["dampers"]),
         (clamped(LIGHT), spectrum, ["nothing that can move has mass"]),
+        (clamped(MAST, works=[HELD]), spectrum, ["works are left out of section forces"]),
         *(
             (clamped(MAST, loads=[load]), spectrum, [name, "the force follows the motion"])
             for name, load in (
@@ -251,6 +253,11 @@ def test_what_cannot_be_analysed_is_refused(scene, curve, words):
     at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0) if scene.loads else None
     with raises(*words):
         st.response_spectrum_analysis(scene, curve, n=1, at=at)
+
+
+def test_peaks_have_a_row_for_each_mode():
+    with raises("combine: peaks of shape (3,) must have a row for each of the 2 modes"):
+        st.response_spectrum_analysis(clamped(MAST), spectrum, n=2).combine(np.ones(3))
 
 
 def test_a_body_beyond_the_end_of_a_beam_moves_with_the_ground():

@@ -218,17 +218,32 @@ def test_a_storey_of_a_path_bears_its_load(mechanism):
     assert "drift at load factor [-]" in storeys.columns()
 
 
-def test_ductility_and_plastic_rotation_of_a_spring():
-    """[closed] Bilinear: M = My + k H/(k + H) (φ - My/k), dissipating My times the plastic part."""
-    k, My, H, φ = 3e6, 3e4, 1e6, 0.05
-    stiff = ub.Section(EA=1e13, GA=1e13, EI=1e13, **LIGHT)
+def turned_spring(law):
+    """Run in which a spring turns by an angle, the spring, and the angle."""
+    φ, stiff = 0.05, ub.Section(EA=1e13, GA=1e13, EI=1e13, **LIGHT)
     beam = ub.Beam((0, 0), (2, 0), stiff, cells=1, name="arm")
-    law = ub.Spring(k, law=ub.ElastoPlastic(My, isotropic=H))
     spring = ub.Turn(ub.ground(0, 0), beam.start, law)
     turned = ub.PrescribedDisplacement(beam.start, u=0.0, v=0.0, psi=lambda t: φ * math.sin(t))
     scene = ub.Scene([beam], supports=[turned], connectors=[spring])
-    run = ub.simulate(scene, ub.Static(), t=(0, math.pi / 2), dt=math.pi / 80)
-    (row,) = st.hinge_table(run, {"IO": 0.02, "CP": 0.03}).rows
+    return ub.simulate(scene, ub.Static(), t=(0, math.pi / 2), dt=math.pi / 80), spring, φ
+
+
+def test_ductility_of_a_spring_that_softens_before_it_yields():
+    """The elastic limit is the lower one of both."""
+    law = ub.Spring(3e6, law=ub.ElastoPlastic(9e4), softening=ub.Softening(3e4, 1e6))
+    run, _, φ = turned_spring(law)
+    (row,) = st.hinge_table(run, {"IO": 0.02}).rows
+    assert row.ductility == pytest.approx(φ * 3e6 / 3e4, rel=1e-12)
+
+
+@pytest.mark.parametrize("limit", [3e4, ub.distributions.Normal(3e4, 3e3, seed=1)])
+def test_ductility_and_plastic_rotation_of_a_spring(limit):
+    """[closed] Bilinear: M = My + k H/(k + H) (φ - My/k), dissipating My times the plastic part."""
+    k, H = 3e6, 1e6
+    run, spring, φ = turned_spring(ub.Spring(k, law=ub.ElastoPlastic(limit, isotropic=H)))
+    (row,) = st.hinge_table(run, {"IO": 0.02, "CP": 0.025}).rows
+    My = run.connector(spring).force[-1] * (k + H) / k - H * φ
+    assert (My == pytest.approx(3e4, rel=1e-12)) == (limit == 3e4)
     plastic = (φ - My / k) * k / (k + H)
     assert row.where == spring
     assert row.time == pytest.approx(math.asin(My / k / φ), abs=math.pi / 80)

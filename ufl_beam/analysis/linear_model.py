@@ -336,7 +336,7 @@ class LinearModel(Rich):
         lengths = small.lengths[small.left[self._free]]
         exact = squares if self._symmetric else None
         model = copy.copy(self)
-        for name in ("_motion", "_space", "states"):
+        for name in ("_motion_and_rest", "_space", "states"):
             vars(model).pop(name, None)
         model._reduction = reduced_motion(
             small.M, self._damping, small.K, F, moved, self._free, x, exact, others, omega, lengths
@@ -457,12 +457,20 @@ class LinearModel(Rich):
                  for names in (self.states, self.inputs, self.outputs)]  # fmt: skip
         return control.ss(*self.state_space(), states=names[0], inputs=names[1], outputs=names[2])
 
-    @cached_property
+    @property
     def _motion(self) -> Motion:
         """Motions as functions of states and inputs."""
+        return self._motion_and_rest[0]
+
+    @cached_property
+    def _motion_and_rest(self) -> tuple[Motion, Array]:
+        """Motions, and static responses besides them with forces of constraints, at all unknowns.
+
+        Both are functions of states and inputs.
+        """
         if self._reduction is not None:
-            return self._reduction[0]
-        small, y = self._small, self._free
+            return self._reduction
+        small, y, μ = self._small, self._free, self._constraints
         if 2 * len(y) > MOST_STATES:
             raise ArgumentError(
                 f"state_space: {2 * len(y)} states are too many for dense matrices; use "
@@ -470,33 +478,22 @@ class LinearModel(Rich):
             )
         M, C, K = (csr_array(A[y][:, y]) for A in (small.M, self._damping, small.K.tocsr()))
         F, moved = self._loads
-        J, h = small.K.tocsr()[self._constraints][:, y], moved[0][self._constraints].toarray()
+        J, h = small.K.tocsr()[μ][:, y], moved[0][μ].toarray()
         names, sizes = self._names_of_motions, small.lengths[small.left[y]]
-        return first_order(
+        motion, missed = first_order(
             M, C, K, F[y], tuple(B[y].toarray() for B in moved), J, h, sizes,
             lambda motion: names[int(np.abs(motion / sizes).argmax())],
         )  # fmt: skip
+        rest = np.zeros((small.K.shape[0], missed.shape[1]))
+        rest[μ] = constraint_forces(small.K.tocsr()[y][:, μ].toarray(), missed, sizes)
+        return motion, rest
 
     @cached_property
     def _space(self) -> tuple[Array, Array, Array, Array]:
         """A, B, C and D with inputs in the order of the user."""
-        small, inputs, out, motion = self._small, self._inputs, self._outputs, self._motion
-        y, μ, ns = self._free, self._constraints, motion.states
-        F, moved = self._loads
-        K, Z = small.K.tocsr(), small._Z
-        if self._reduction is not None:
-            rest = self._reduction[1]
-        else:
-            # Forces of constraints bear what the equation of the motions misses
-            missed = F[y] @ motion.f - K[y][:, y] @ motion.y
-            missed -= (
-                self._damping[y][:, y] @ motion.velocity + small.M[y][:, y] @ motion.acceleration
-            )
-            for B, x in zip(moved, (motion.u, motion.du, motion.ddu), strict=True):
-                missed += B[y] @ x
-            sizes, rest = small.lengths[small.left[y]], np.zeros((K.shape[0], missed.shape[1]))
-            rest[μ] = constraint_forces(K[y][:, μ].toarray(), missed, sizes)
-        X = Z[:, y] @ motion.y + inputs.motions @ motion.u
+        inputs, out, (motion, rest) = self._inputs, self._outputs, self._motion_and_rest
+        ns, Z = motion.states, self._small._Z
+        X = Z[:, self._free] @ motion.y + inputs.motions @ motion.u
         dX, terms = X[:, :ns] @ motion.rates, np.abs(X[:, :ns]) @ np.abs(motion.rates)
         for rows, x, magnitudes in ((out.rows[1], X, np.abs(X)), (out.rows[2], X, np.abs(X)),
                               (out.rows[2], dX, terms)):  # fmt: skip
@@ -507,7 +504,7 @@ class LinearModel(Rich):
                     "motion has no mass; give it mass, use another output, or frequency_response"
                 )
         Y = out.rows[0] @ (X + Z @ rest)
-        Y[:, ns : ns + F.shape[1]] += out.direct
+        Y[:, ns : ns + out.direct.shape[1]] += out.direct
         Y += out.rows[1] @ dX + out.rows[2] @ (dX[:, :ns] @ motion.rates)
         A, B = motion.rates[:, :ns], motion.rates[:, ns:]
         return A, B[:, inputs.order], Y[:, :ns], Y[:, ns:][:, inputs.order]

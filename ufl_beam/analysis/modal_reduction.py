@@ -74,20 +74,17 @@ def reduced_motion(
     loads = F @ f - forces @ q - (K @ v) @ b
     by_rates = (B1 - C @ P) @ du + (B2 - M @ P) @ ddu - (C @ x) @ dq
     loads[y] += by_rates[y]
-    rest, rates = solve(loads)
+    rest, z = solve(loads)
     constraints = np.isin(np.arange(size), y, invert=True)[:, None]
     # Rates of lags with mass are left out, like r'.
     light = np.where(M.diagonal()[:, None] == 0.0, v, 0.0)
     rest = rest + constraints * (x @ q + P @ u) + (v - light) @ b
-    ddq, db = rates[:n] - own[:, None] * q, rates[W.shape[1] :]
+    ddq, db = z[:n] - own[:, None] * q, z[W.shape[1] :]
     toward = (M @ x)[y].T
     beside = np.linalg.solve(v.T @ damped, damped.T)[:, y]
     read = np.vstack([toward, beside - (beside @ x[y]) @ toward])
-    motion = Motion(
-        int(at[5]), np.vstack([dq, db, ddq, du, ddu]), (x @ q + light @ b + P @ u)[y],
-        (x @ dq + light @ db + P @ du)[y], (x @ ddq + P @ ddu)[y], u, du, ddu, f, read, P[y],
-    )  # fmt: skip
-    return motion, rest
+    rates = np.vstack([dq, db, ddq, du, ddu])
+    return Motion(int(at[5]), rates, (x @ q + light @ b + P @ u)[y], u, read, P[y]), rest
 
 
 def _bordered(K: csr_array, W: Array) -> Callable[[Array], tuple[Array, Array]]:

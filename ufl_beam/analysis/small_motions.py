@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Complex
-from ufl_beam.errors import StepFailed
+from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.solvers import eigensolvers
@@ -73,7 +73,12 @@ class SmallMotions(Linearization):
         each work may be round-off, and the least squared frequency of the other motions.
         """
         solve = partial(eigensolvers.linear, matrix, self.M, n, most=self.most, definite=definite)
-        values, x = solve(shift=-SHIFT * self.squares.min())
+        try:
+            values, x = solve(shift=-SHIFT * self.squares.min())
+        except np.linalg.LinAlgError:
+            raise ArgumentError(
+                "neither mass nor stiffness determines some motion in this state; give it mass"
+            ) from None
         works, zero = self._works(x.real)
         first = np.abs(values[~zero].real).min(initial=self.squares.max())
         if zero.any():

@@ -23,19 +23,13 @@ class Motion(NamedTuple):
     """Motions as linear functions of states and inputs; one column each.
 
     The states are a, the part of b that a damper resists, a', u and u'.  The inputs are forces f,
-    and u''.  ``velocity`` and ``acceleration`` lack the part of b that follows at once from the
-    others: neither mass nor damping acts on it.
+    and u''.
     """
 
     states: int  # number of states, which are the first columns
     rates: Array  # of the states
     y: Array
-    velocity: Array
-    acceleration: Array
     u: Array
-    du: Array
-    ddu: Array
-    f: Array
     read: Array  # matrix that returns a and the damped part of b for y - P u
     P: Array
 
@@ -78,8 +72,11 @@ def _coordinates(M: csr_array, J: csr_array, h: Array, sizes: Array) -> tuple[Ar
 def first_order(
     M: csr_array, C: csr_array, K: csr_array, F: csr_array, moved: tuple[Array, Array, Array],
     J: csr_array, h: Array, sizes: Array, name_of: Callable[[Array], str],
-) -> Motion:  # fmt: skip
+) -> tuple[Motion, Array]:  # fmt: skip
     """Solve ``M y'' + C y' + K y = F f + B0 u + B1 u' + B2 u''`` for the rates of states.
+
+    The results are the motions, and the sums of all forces on them, which constraints bear.  Rates
+    of the part of b on which neither mass nor damping acts do not enter.
 
     Args:
         M: Mass of the motions y.
@@ -129,11 +126,12 @@ def first_order(
     rate = (U1.T @ (on_light - V0.T @ (Kr @ z + Cr @ (V1 @ da)))) / viscosity[:r, None]
     dz = V1 @ da + V0 @ (W1 @ rate)
     dda = solve(V1.T @ Mr @ V1, V1.T @ (external - Kr @ z - Cr @ dz), assume_a="pos")
-    rates = np.vstack([da, rate, dda, du, ddu])
-    return Motion(
-        int(at[5]), rates, N @ z + P @ u, N @ dz + P @ du, N @ (V1 @ dda) + P @ ddu,
-        u, du, ddu, f, np.vstack([read[:na], W1.T @ read[na:]]), P,
-    )  # fmt: skip
+    y, velocity, acceleration = N @ z + P @ u, N @ dz + P @ du, N @ (V1 @ dda) + P @ ddu
+    missed = F @ f - K @ y - (C @ velocity + M @ acceleration)
+    for B, x in zip(moved, (u, du, ddu), strict=True):
+        missed += B @ x
+    rates, read = np.vstack([da, rate, dda, du, ddu]), np.vstack([read[:na], W1.T @ read[na:]])
+    return Motion(int(at[5]), rates, y, u, read, P), missed
 
 
 def constraint_forces(G: Array, forces: Array, sizes: Array) -> Array:

@@ -173,8 +173,6 @@ class Section(Record):
         stiffness = np.array([getattr(self, name) for name in names.values()], float)
         axes = np.eye(len(names))
         if self.interaction is not None:
-            if hinge is not None:
-                raise ModelError("Section: a hinge beside interaction of N and M; leave one out")
             inelastic = np.array([name in self.interaction.resultants for name in "NVM"])
             chosen, laws = [inelastic], [self.interaction]
         else:

@@ -322,7 +322,6 @@ class Description:
             self.texts[name] = f"function {value.__qualname__}"
             yield from self._function_members(name, value)
         elif isinstance(value, MethodType):
-            self.texts[name] = f"method {value.__func__.__qualname__}"
             yield "", value.__func__
             yield ".self", value.__self__
         elif isinstance(value, partial):

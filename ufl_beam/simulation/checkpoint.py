@@ -161,8 +161,6 @@ class CheckpointFile:
                         for texts in (now, then)
                     )
                 step, before, differs = self._step, self.content["step"], difference(now, then)
-                if not differs and (step is None) != (before is None):
-                    differs = "one run has equal steps, and the other has adaptive steps"
                 if not differs and step and abs(step - before) > 1e-9 * before:
                     differs = f"the step is {step!r} s, in the file {before!r} s"
                 if not differs and [*self._stateful] != [*self.content["stateful"]]:

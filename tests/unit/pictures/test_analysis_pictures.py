@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from drawn import STEEL, boxes_of, circles, outlines, require_apart, texts
+from helpers import raises
 from matplotlib.figure import Figure
 from scenes import clamped
 
@@ -57,6 +58,25 @@ def test_responses_and_combinations_have_both_signs():
         figure = ub.plot(found, "V")
         assert len(outlines(figure, RED)) == len(outlines(figure, BLUE)) == 1
         assert figure.axes[0].get_title(loc="left").endswith(words)
+
+
+def test_a_study_is_drawn_over_each_number_that_its_cases_vary():
+    """Arrays by their largest magnitude; neither over names nor over equal numbers."""
+
+    def member(a, b, name, fixed):
+        return {"sum": a + b, "motion": np.array([a, -3 * b])}
+
+    cases = [(1.0, 5, "x"), (2.0, 7, "y"), (4.0, 6, "x")]
+    cases = [{"a": a, "b": b, "name": name, "fixed": 1.0} for a, b, name in cases]
+    study = ub.study(member, cases, progress=False)
+    axes = np.reshape(ub.plot(study).axes, (2, 2))
+    for panels, expected in zip(axes, ([15, 21, 18], [6, 9, 10]), strict=True):
+        for panel, x in zip(panels, ([1, 2, 4], [5, 7, 6]), strict=True):
+            np.testing.assert_array_equal(panel.lines[0].get_xydata(), np.transpose([x, expected]))
+    assert [x.get_xlabel() for x in axes[1]] == ["a", "b"]
+    assert [x.get_ylabel() for x in axes[:, 0]] == ["motion", "sum"]
+    with raises("plot: the study has no results over numbers of its cases"):
+        ub.plot(ub.study(lambda name: {"x": 1.0}, [{"name": "x"}], progress=False))
 
 
 def test_demand_curves_end_at_collapse():

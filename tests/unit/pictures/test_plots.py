@@ -270,6 +270,7 @@ def end(s):
         (lambda s: ub.plot(s, "shapes", 8), "for a number of shapes give count=8"),
         (lambda s: ub.plot(s, "shapes", times="all"), "plot: times = 'all' must be numbers"),
         (lambda s: ub.plot(s, "shapes", times=[]), "plot: times is empty"),
+        (lambda s: ub.plot(ub.modes(s.scene, 1), numbers=[]), "plot: numbers is empty"),
         (lambda s: ub.plot(s, "history", 3), "plot: places = 3"),
         (lambda s: ub.plot(s, "history", "end"), "plot: places = 'end' must be a list"),
         (lambda s: ub.plot(s, "history", []), "plot: places is empty"),
