@@ -474,12 +474,6 @@ WRONG = {
             bodies=[BALL], loads=[ub.FollowerLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
         ), "not the centre of the body",
     ),
-    "rigid-plastic law": (
-        lambda: ub.Scene([BEAM], connectors=[
-            ub.Slide(ub.ground(1, 0, 0), BEAM.end, ub.RigidPlastic(ub.ElastoPlastic(1.0)),
-                     axis=(0, 1, 0))
-        ]), "RigidPlastic is a law for scenes in the plane",
-    ),
     "moving mass": (
         lambda: ub.Scene([BEAM], loads=[ub.MovingLoad(BEAM, abs, mass=1.0)]), "masses that move",
     ),

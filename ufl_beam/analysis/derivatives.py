@@ -614,8 +614,8 @@ class Derivatives:
             states["v"] = solution.v + change * self._v[:, p]
         reactions = solution.column("reactions")[:,]
         for k, support in enumerate(solution.scene.supports):
-            dofs, numbering = solution.numbering.node(support.place), solution.numbering
-            components = [k for c in support.held for k in numbering.components(c)]
+            dofs = solution.numbering.node(support.place)
+            components = [*support.held]
             at = np.searchsorted(self._constrained_dofs, dofs[components])
             reactions[:, k, components] += change * self._reactions[:, p, at]
         if solution.scene.in_space:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -117,10 +116,9 @@ class Linearization:
         for group in simulation.connector_terms:
             group.freeze()
         Q = eye_array(self.numbering.size, format="lil")
-        for support in (support for support in scene.supports if support.angle):
-            i, j = self.numbering.node(support.place)[:2]
-            c, s = math.cos(support.angle), math.sin(support.angle)
-            Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
+        for support in (support for support in scene.supports if support.turns):
+            dofs = self.numbering.node(support.place)
+            Q[np.ix_(dofs, dofs)] = support.axes.T
         self._axes = csr_array(Q)  # columns: unit motions along the axes of supports
         _, T = self._linearized(self.q)
         multipliers = self.numbering.multipliers

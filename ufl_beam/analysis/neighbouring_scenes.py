@@ -111,7 +111,7 @@ def alike(run: Simulation, other: Any) -> bool:
     if not same_cells(run.numbering, other.numbering):
         return False
     terms = [[term.parts for term in x.equation.terms] for x in (run, other)]
-    angles = [[support.angle for support in x.scene.supports] for x in (run, other)]
+    angles = [[[*support.turns] for support in x.scene.supports] for x in (run, other)]
     constrained = np.array_equal(run.supports.dofs, other.supports.dofs)
     return terms[0] == terms[1] and angles[0] == angles[1] and constrained
 

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -262,11 +261,8 @@ def _rows(
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
         yield connector, [(node(end), (*x[:d], *(y * scale for y in x[d:]))) for end, x in ends]
     for support in supports:
-        cos, sin = math.cos(support.angle), math.sin(support.angle)
-        turned = (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)
         for component in support.held:
-            for unit in _units(scene, component) if d == 3 else [turned[component]]:
-                yield support, [(node(support.place), unit)]
+            yield support, [(node(support.place), support.axes[component].tolist())]
 
 
 def _units(scene: Scene, component: int) -> list[Sequence[float]]:

@@ -95,6 +95,15 @@ class Support(Bearing, Record, ABC):
         """
         return [(0, 1, self.angle)] if self.angle else []
 
+    @property
+    def axes(self) -> Array:
+        """Directions of the components as rows, by components along the axes of the scene."""
+        rows: Array = np.eye(3 * self.displacements - 3)
+        for i, j, angle in self.turns:
+            cos, sin = math.cos(angle), math.sin(angle)
+            rows[[i, j]] = [[cos, sin], [-sin, cos]] @ rows[[i, j]]
+        return rows
+
     def functions_of_time(self) -> Iterable[TimeFunction]:
         """See the base class."""
         return self.held.values()

@@ -156,7 +156,7 @@ def _draw_scene(axes: Any, shape: DeformedShape, unit: float, color: str = INK) 
     for moves, own in ((False, GROUND_GREY), (True, ORANGE)):
         held = [s for s in scene.supports if bool(s.moving) == moves]
         for rotates, marker in ((False, "s"), (True, "^")):
-            places = [shape.at(s.place) for s in held if (2 not in s.held) == rotates]
+            places = [shape.at(s.place) for s in held if s.bears_moment != rotates]
             _markers(axes, places, marker, own, own, 9.0, 3)
     ground = [x for x in shape.canvas.spots if x not in scene.bodies]
     _markers(

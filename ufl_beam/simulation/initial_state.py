@@ -179,7 +179,7 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
     part._blocks = solution.subset(0, n + 1)._blocks
     reactions = np.zeros(numbering.size)
     for support, forces in zip(scene.supports, part.column("reactions")[:,][-1], strict=True):
-        held = [k for c in support.held for k in numbering.components(c)]
+        held = [*support.held]
         reactions[numbering.node(support.place)[held]] = forces[held]
     part.internal = {"reactions": reactions} if np.isfinite(reactions).all() else {}
     if scene.in_space:
