@@ -293,7 +293,11 @@ OWN = {
     "Effect": {"statement": (AirDrag(), [*OBJECT, AirDrag]),
         "places": ([BEAM.end], [*LIST, [BEAM.end, BEAM.start]]),
         "beams": (None, [[BEAM], *optional(LIST)])},
-    "RotatingFrame": {"about": ((0, 0), VECTOR)},
+    "PrescribedDisplacement": {  # the scene is in the plane
+        "w": (None, [*optional(MOVED), 1.0]), "up": (None, [*optional(VECTOR), (0, 0, 1)]),
+        "axis": (None, [*optional(VECTOR), (0, 0, 1)])},
+    "Pressure": {"normal": (1.0, [x for x in NUMBER if x is not ARRAY])},
+    "RotatingFrame": {"about": ((0, 0), EITHER)},
     "Spline": {"s": ([0, 1], optional(TIMES)),
         "points": ([(0, 0), (1, 0)], [None, 1.0, "01", [(0, 0)], [(0, 0), (1, NAN)], [0, 1]])},
     "GroundMotion": {"values": ([0, 1], [*VALUES, [[0, 1]]])},

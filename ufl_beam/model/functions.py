@@ -365,6 +365,11 @@ class Table:
                 f"Table: times must increase, but times[{i}] = {before:g} is followed by {after:g}"
             )
 
+    @property
+    def kinks(self) -> Sequence[float]:
+        """Times at which the slope may jump; adaptive steps end there; s."""
+        return self.times
+
     def __call__(self, t: float) -> float:
         """Return the value at time ``t``."""
         return float(np.interp(t, self.times, self.values))

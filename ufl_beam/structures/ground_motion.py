@@ -360,6 +360,11 @@ class Integral:
     motion: GroundMotion
     order: int  # 1: velocity, 2: displacement
 
+    @property
+    def kinks(self) -> Sequence[float]:
+        """Times at which a derivative jumps; adaptive steps end there; s."""
+        return self.motion.acceleration.times
+
     def __call__(self, t: float) -> float:
         """Return the velocity (m/s) or displacement (m) at time ``t``."""
         times, a, v, u = self.motion.histories
