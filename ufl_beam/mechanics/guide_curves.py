@@ -46,7 +46,7 @@ IN_UFL = (
 """Advice in the errors of curves that are no expressions of UFL."""
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=None)
 def number(i: int) -> Expr:
     """Return the symbol of the i-th number of a curve."""
     return ufl.Constant(_MESH)
