@@ -212,3 +212,31 @@ def test_hinge_snap_back(law, steepness):
     after = slice(peak.n, peak.n + 3)
     assert (np.diff(F[after]) < 0).all()
     assert (np.diff(δ[after]) < 0).all()
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("arc", [0.03, 0.05, 0.17])
+@pytest.mark.parametrize("ratio", [1.0, 6.0])
+def test_a_brittle_hinge_softens_whatever_the_steps(ratio, arc, space):
+    """The path goes on to dissipate from the limit on; elastic unloading is a path, too."""
+    EI, length, limit = 1e6, 2.0, 10e3  # N m², m, N m
+    energy, stiff = limit**2 / (ratio * 3 * EI / length), 1e5 * EI / length**2
+    more = {"GA3": stiff, "EI2": EI, "GJ": EI} if space else {}
+    section = ub.Section(EA=stiff, GA=stiff, EI=EI, **more)
+    law, z = ub.Softening(limit=limit, fracture_energy=energy), (0.0,) * space
+    beam = ub.Beam(
+        (0, 0, *z), (length, 0, *z), section, cells=4, hinges={0.0: law},
+        **({"up": (0, 1, 0)} if space else {}),
+    )  # fmt: skip
+    load = ub.PointLoad(beam.end, force=(0, limit / length, *z), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    path = ub.follow(
+        scene, ub.DissipationControl(energy / 20, ub.ArcLength(arc)), steps=100, progress=False,
+        until=lambda now: now.ledger.lost["hinges"] > 0.9 * energy,
+    )  # fmt: skip
+    lost, factor = path.energy["hinges"], path.factor
+    assert 0.9 * energy < lost[-1] < energy
+    assert factor.min() > -1e-9
+    # The moment falls linearly with the dissipated energy; the arm shortens by second order.
+    at = lost > 0.1 * energy
+    assert np.abs(factor[at] - (1 - lost[at] / energy)).max() < 0.01

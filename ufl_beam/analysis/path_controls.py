@@ -28,6 +28,7 @@ from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.term import Term
 
 MOST_DOUBLINGS = 30  # largest number of doublings of a step in searches for a dissipated energy
+BEYOND_LIMIT = 1e-9  # length of a motion beyond a limit, which lets a hinge or spring open
 ONSET_FRACTION = 1e-6  # dissipated energy at the onset, as a fraction of the energy in the step
 AT_END = 1e-6  # distance from the end of a path that counts as none, as a fraction of a step
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
@@ -64,6 +65,7 @@ class PathCorrector:
         direction: Direction of the path at the beginning of the step.
         predicted_step: The predicted step.
         dissipates: True if energy was dissipated in the latest accepted step.
+        onset: True if the path dissipates energy from the latest accepted state on.
     """
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
@@ -77,7 +79,7 @@ class PathCorrector:
         self.factor_gradient = np.append(0.0 * squares, subdomain.comm.rank == 0)
         self.weights = np.append(squares, 0.0) + self.factor_gradient / factor**2
         self.t = simulation.t
-        self.dissipates = False
+        self.dissipates = self.onset = False
         self.crossing: Crossing | None = None
         self._loading: list[Term] = [*simulation.loads, *simulation.connector_terms]
         # The forces of these cells depend on the load factor, too.
@@ -152,6 +154,17 @@ class PathCorrector:
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
         increment = self._length_to(ONSET_FRACTION * whole, q, motion, (0.0, 1.0), 40) * step
+        return increment, self.direction_beyond(increment)
+
+    def onward(self) -> tuple[Array, Array]:
+        """Return a first part of a step, and the direction after it.
+
+        At an onset the part leads back beyond the limit, which lets the hinge or spring open.
+        """
+        if not self.onset:
+            return 0.0 * self.direction, self.direction
+        self.begin()
+        increment = -BEYOND_LIMIT / self.length(self.direction) * self.direction
         return increment, self.direction_beyond(increment)
 
     def direction_beyond(self, step: Array) -> Array:
@@ -367,9 +380,8 @@ class Control(Record):
         If the first attempt fails and dissipation begins in the step, a second attempt changes the
         direction at the onset of dissipation.
         """
-        target_change, direction = abs(self.step) * fraction, corrector.direction
-        increment = 0.0 * direction
-        rest, hold = target_change, True
+        rest = target_change = abs(self.step) * fraction
+        (increment, direction), hold = corrector.onward(), not corrector.onset
         while True:
             normal = self.normal(corrector, direction)
             speed = corrector.along(normal, direction)
@@ -582,17 +594,18 @@ class DissipationControl(Control):
         """Solve for a step that dissipates the energy ``step``, or for an arc-length step.
 
         An arc-length step is taken if the last step dissipated no energy and this step does not,
-        or if the step by energy fails.
+        or if the step by energy fails.  At an onset of dissipation the path goes on to dissipate:
+        an arc-length step could find elastic unloading instead.
         """
-        if not corrector.dissipates:
+        if not (corrector.dissipates or corrector.onset):
             with suppress(StepFailed):
                 trial = self.otherwise.solve_step(corrector, fraction)
                 if corrector.dissipation(trial.q1) == 0.0:
                     return trial
-        energy, direction = self.step * fraction, corrector.direction
+        energy = self.step * fraction
         try:
             corrector.begin()
-            step = corrector.until(energy, 0.0 * direction, direction)
+            step = corrector.until(energy, *corrector.onward())
             if (kink := corrector.kink(step)) is not None:
                 step = corrector.until(energy, *kink)
             return corrector.attempt(step, None, energy, hold=False)

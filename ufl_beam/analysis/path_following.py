@@ -356,7 +356,10 @@ class PathStepper:
 
     def _go_to(self, candidate: Candidate) -> None:
         corrector = self.corrector
-        corrector.dissipates = corrector.dissipation(candidate.trial.q1) > 0.0
+        q = candidate.trial.q1
+        corrector.dissipates = corrector.dissipation(q) > 0.0
+        side = 0.0 if corrector.dissipates else corrector.dissipation_side(q, candidate.direction)
+        corrector.onset = side > 0.0
         self._simulation.accept(candidate.trial)
         corrector.direction = corrector.carried(candidate.direction, candidate.trial)
         self._before = candidate

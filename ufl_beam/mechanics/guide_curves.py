@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import basix.ufl
@@ -46,7 +46,7 @@ IN_UFL = (
 """Advice in the errors of curves that are no expressions of UFL."""
 
 
-@lru_cache(maxsize=None)
+@cache
 def number(i: int) -> Expr:
     """Return the symbol of the i-th number of a curve."""
     return ufl.Constant(_MESH)
