@@ -55,8 +55,8 @@ assert 1.0 < limit < 1.0 + neglected
 #
 # A lateral load of a thousandth makes the bar choose a side.  The load still rises after buckling,
 # because the twisted bar bends about its strong axis, too.  A hinge at the clamp about the strong
-# axis has 0.8 or 1.03 times the moment of the buckling load.  When it opens, the load falls; the bar
-# that had buckled straightens sideways while it turns down about the hinge.
+# axis has 0.8 or 1.03 times the moment of the buckling load.  When it opens, the load falls; the
+# bar that had buckled straightens sideways while it turns down about the hinge.
 
 
 # %%
@@ -121,7 +121,7 @@ with ub.picture((9, 4.5)) as figure:
         ax.axhline(1.0, color="0.7", lw=1)
         ax.set_xlabel(f"{name} displacement of the end (m)")
     both[0].set_ylabel("load over the closed form")
-    both[1].legend(frameon=False)
+    both[0].legend(frameon=False, loc="lower right")
 figure.savefig(output / "lateral_buckling_paths.png")
 ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("lateral*")), sep="\n  ")
 

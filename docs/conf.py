@@ -68,7 +68,10 @@ nb_execution_timeout = 600
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 
-SLOW = ["lattice", "flying_beam", "slider_crank", "tradeoff", "vibrating_frame", "four_beam_swing"]
+SLOW = [
+    "lattice", "flying_beam", "slider_crank", "tradeoff", "vibrating_frame", "four_beam_swing",
+    "tumbling_beam", "right_angle_frame", "bricard",
+]  # fmt: skip
 if os.environ.get("UFL_BEAM_DEMOS") == "cheap":
     nb_execution_excludepatterns = [f"demos/demo_{name}.py" for name in SLOW]
 

@@ -53,7 +53,7 @@ def test_the_script_of_a_page_runs_and_prints_its_text(page, tmp_path, monkeypat
 def test_pictures_of_a_page_are_those_of_its_script(page):
     """A picture that a page shows is saved by its script under the same name."""
     scripts = "".join(blocks_of(page) + blocks_of(page, "py"))
-    saved = re.findall(r'(?:savefig|SaveScreenshot)\("(\w+\.png)"', scripts)
+    saved = re.findall(r'(?:savefig\(|SaveScreenshot\(|render\(\w+, )"(\w+\.png)"', scripts)
     assert {*pictures_of(page)} <= {*saved}
 
 
