@@ -33,6 +33,7 @@ from ufl_beam.model.connectors import (
     across,
     axes_of,
     require_apart,
+    require_one_dimension,
     unit_axis,
 )
 from ufl_beam.model.functions import Curve, Point, guide_curve
@@ -82,6 +83,7 @@ class Joint(Bearing, Record, ABC):
     def __post_init__(self) -> None:
         places = (x for x in vars(self).values() if isinstance(x, Place | BodyPoint))
         vars(self).setdefault("places", tuple(places))
+        require_one_dimension(self, (x for x in self.places if isinstance(x, Place | BodyPoint)))
         super().__post_init__()
 
     def __str__(self) -> str:
@@ -101,9 +103,9 @@ class Joint(Bearing, Record, ABC):
 
 
 def _require_in_space(joint: Joint, instead: str) -> None:
-    """Raise :class:`ModelError` if a place of a joint is in the plane."""
+    """Raise :class:`ModelError` if the places of a joint are in the plane."""
     places = getattr(joint, "places", vars(joint).values())
-    if any(len(getattr(x, "point", ())) == 2 for x in places):
+    if {len(x.point) for x in places if hasattr(x, "point")} == {2}:
         raise ModelError(
             f"{type(joint).__name__}: the joint is for scenes in space; use {instead} in the plane"
         )
