@@ -393,6 +393,11 @@ class Block(LoadTerm):
         if archive.has(f"time of {name}"):
             self.start(q)
 
+    @property
+    def states(self) -> Array:
+        """States of the elements, in batches."""
+        return self._states
+
     def keep_states(self, archive: Archive, first: int = 0, last: int | None = None) -> None:
         """Save or restore the states of the elements from the first to the last one."""
         if number := len(self.statement.state[first:last]):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import Inputs, Statement
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.mechanics.spatial_kinematics import Turn, Vector, product, subtract
@@ -54,6 +54,15 @@ def put_turns(block: Any, turns: Array) -> None:
         values = in_batches(turns[dofs], BATCH)
         for i, name in enumerate(quaternion_names(k)):
             state[name][:] = values[:, i]
+
+
+def places_of_turns(block: Any, own: Index, first: Index | int = 0) -> Index:
+    """Return the places of the quaternions of elements ``own`` in the states of a block; (n, 4).
+
+    ``first`` are the indices of their first numbers among the states of an element.
+    """
+    row = own // BATCH * len(block.statement.state) + first
+    return np.asarray((row[:, None] + np.arange(4)) * BATCH + own[:, None] % BATCH)
 
 
 def vector(at: Inputs, group: str, names: str, k: int) -> Vector:

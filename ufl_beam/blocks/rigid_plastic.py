@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import BlockSetting
 from ufl_beam.blocks.connectors import ConnectorBlock, Data, OnConnector, Step
 from ufl_beam.blocks.material_points import EXHAUSTED, FREED_STIFFNESS
-from ufl_beam.blocks.nodes_in_space import quaternion_names
+from ufl_beam.blocks.nodes_in_space import places_of_turns, quaternion_names
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
@@ -214,13 +214,7 @@ class HingeBlock(ConnectorBlock):
                 turn = names.index(quaternion_names(int(hinge.b is place))[0])
                 pairs.append((self.connectors.index(hinge), turn, vertex))
         own, first, vertices = np.reshape(pairs, (-1, 3)).astype(np.int64).T
-        row = own // BATCH * len(names) + first
-        return (row[:, None] + np.arange(4)) * BATCH + own[:, None] % BATCH, vertices
-
-    @property
-    def states(self) -> Array:
-        """States of all hinges, in batches."""
-        return self._states
+        return places_of_turns(self, own, first), vertices
 
     def remaining(self) -> Array:
         """See the base class."""

@@ -23,12 +23,12 @@ from ufl_beam.blocks.nodes_in_space import (
     change,
     matrix_of,
     new_state,
+    places_of_turns,
     quaternion,
     vector,
 )
 from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.compiled.simd_kernels import BATCH
 from ufl_beam.discretization.cells_in_space import (
     STIFFNESS_IN_SPACE,
     cell_axes,
@@ -303,13 +303,7 @@ class CellsInSpace(BeamCells):
         cells = self._elements.indices
         cell, second = of_vertices(numbering, cells).T
         own, vertices = np.searchsorted(cells, cell), np.unique(numbering.cells[cells])
-        row = own // BATCH * len(self.statement.state) + 4 * second
-        return (row[:, None] + np.arange(4)) * BATCH + own[:, None] % BATCH, vertices
-
-    @property
-    def states(self) -> Array:
-        """States of all cells, in batches."""
-        return self._states
+        return places_of_turns(self, own, 4 * second), vertices
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """See the base class: quaternions."""
@@ -330,8 +324,6 @@ class CellsInSpace(BeamCells):
 
 class InelasticCellsInSpace(InelasticCells):
     """Cells of beams in space with material points."""
-
-    states = CellsInSpace.states
 
     def __init__(self, fields: Fields, section_points: SectionPoints, *others: Any) -> None:
         super().__init__(fields, section_points, *others)
@@ -413,13 +405,7 @@ class BodiesInSpace(Block):
     def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
         """Return the places in the states of the quaternions of bodies, and their nodes."""
         own = np.arange(len(self._elements.indices))
-        row = own[:, None] // BATCH * 4 + np.arange(4)
-        return row * BATCH + own[:, None] % BATCH, len(numbering.points) + own
-
-    @property
-    def states(self) -> Array:
-        """States of all bodies, in batches."""
-        return self._states
+        return places_of_turns(self, own), len(numbering.points) + own
 
 
 def bodies_in_space(setting: BlockSetting) -> list[BodiesInSpace]:

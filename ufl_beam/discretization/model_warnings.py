@@ -225,18 +225,19 @@ def warn_of_far_points(scene: Scene) -> None:
         neighbours = tree.query_ball_point(place.point, 1e-9 * scene.size)
         if any(others[i][1] is not place.body for i in neighbours):
             continue
-        body, ((x, y), (cx, cy)) = place.body, (place.point, place.body.center)
+        body = place.body
         out = math.dist(place.point, body.center)
-        if body.mass and body.inertia:
-            far = out > FAR_OUT * math.sqrt(body.inertia / body.mass)
+        if body.mass and np.any(body.tensor):
+            far = out > FAR_OUT * math.sqrt(np.linalg.eigvalsh(body.tensor).max() / body.mass)
         else:
             box = np.array([*(point for point, owner in others if owner is not body), body.center])
             far = _outside(np.array(place.point), box) > math.hypot(*np.ptp(box, axis=0)) > 0.0
         if far:
+            moved = (f"{c:g} + {x:g}" for c, x in zip(body.center, place.point, strict=True))
             warn(
                 f"{place} is {out:.4g} m away from the centre of {body.name}, and nothing else "
-                "is there. body.at(x, y) takes coordinates of the undeformed scene; a point "
-                f"relative to the centre is at({cx:g} + {x:g}, {cy:g} + {y:g})"
+                f"is there. body.at({', '.join('xyz'[: len(place.point)])}) takes coordinates of "
+                f"the undeformed scene; a point relative to the centre is at({', '.join(moved)})"
             )
 
 
@@ -258,17 +259,18 @@ def warn_of_origin(scene: Scene) -> None:
     diagonal of the box around the rotating beams and bodies.
     """
     points = np.array([point for point, _ in _points(scene)])
-    away = _outside(np.zeros(2), points)
+    away = _outside(np.zeros(points.shape[1]), points)
     for velocity in scene.initial:
-        if velocity.angular == 0.0 or velocity.about is not None:
+        if not np.any(velocity.angular) or velocity.about is not None:
             continue
         moved = set(velocity.beams)
         ends = np.array([p for p, owner in _points(scene) if owner in moved])
         if away > (np.linalg.norm(np.ptp(ends, axis=0)) if len(ends) else 0.0):
             names = ", ".join(beam.name for beam in velocity.beams[:3])
+            spin = ", ".join(f"{x:g}" for x in np.ravel(velocity.angular))
             warn(
-                f"Velocity of {names}: angular = {velocity.angular:g} rad/s without about= turns "
-                f"about the origin, which is {away:.4g} m away from the scene. Give about=(x, y), "
+                f"Velocity of {names}: angular = {spin} rad/s without about= turns about the "
+                f"origin, which is {away:.4g} m away from the scene. Give about= a point, "
                 "also if the origin is meant"
             )
 

@@ -89,6 +89,7 @@ class Connector(Record, ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require_one_dimension(self, (self.a, self.b))
         components = self.law.components if isinstance(self.law, ConnectorLaw) else 1
         if components > 1 and self.kind != "Bushing":
             raise ModelError(
@@ -344,8 +345,18 @@ UNIT_TOLERANCE = 4 * sys.float_info.epsilon
 """Largest round-off error of the length of a unit vector."""
 
 
+def require_one_dimension(owner: object, places: Iterable[AttachmentPoint]) -> None:
+    """Raise :class:`ModelError` if some places are in the plane, and others in space."""
+    if len({len(place.point) for place in places}) > 1:
+        raise ModelError(
+            f"{owner}: some places have two coordinates, and others three; give all points of a "
+            "scene in space three coordinates"
+        )
+
+
 def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
     """Return the unit vector along ``axis``, by default along the line from ``a`` to ``b``."""
+    require_one_dimension(f"{kind}({a}, {b})", (a, b))
     along = tuple(y - x for x, y in zip(a.point, b.point, strict=True))
     given: Any = along if axis is None else require_point(axis, f"{kind}: axis")
     if len(given) != len(along):

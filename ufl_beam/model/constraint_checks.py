@@ -68,9 +68,10 @@ def require_inertia(scene: Scene) -> None:
     Rigid motions without inertia need stiffness, damping or constraints.  Otherwise the equations
     of motion are singular.
     """
-    sections = [beam.section for beam in scene.beams]
-    inertias = [x for s in sections for x in (s.rhoA, s.rhoA, s.rhoA or s.rhoI)]
-    inertias += [x for body in scene.bodies for x in (body.mass, body.mass, body.inertia)]
+    d, rotations = (3, 3) if scene.in_space else (2, 1)
+    own = [(beam.section.rhoA, beam.section.rhoA or beam.section.rhoI) for beam in scene.beams]
+    own += [(body.mass, float(np.any(body.tensor))) for body in scene.bodies]
+    inertias = [x for mass, inertia in own for x in [mass] * d + [inertia] * rotations]
     if all(inertias):
         return
     masses = [
@@ -394,8 +395,10 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             if law.bulk.stressed((np.float64(law.stiffness),), (moved,)):
                 wrong.append((connector, law.law or law, "a stress at no strain"))
     for beam in scene.beams:
-        for points in beam.section.section_points(None):
-            strains = LAST_DIGITS * np.abs(points.strains) @ [1.0, 1.0, 1.0 / scene.size]
+        scales = np.ones(6 if scene.in_space else 3)
+        scales[len(scales) // 2 + len(scales) % 2 :] /= scene.size  # of curvatures
+        for points in beam.section.section_points(None, scene.in_space):
+            strains = LAST_DIGITS * np.abs(points.strains) @ scales
             by_point = np.stack([points.stiffness, strains], axis=1)
             by_point = by_point.reshape(len(points.weights), -1, 2)
             first = np.cumsum([0, *(n for _, n in points.laws)])

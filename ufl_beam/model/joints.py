@@ -33,6 +33,7 @@ from ufl_beam.model.connectors import (
     across,
     axes_of,
     require_apart,
+    require_one_dimension,
     unit_axis,
 )
 from ufl_beam.model.functions import Curve, Point, guide_curve
@@ -54,6 +55,7 @@ class Joint(Bearing, Record, ABC):
         meets: True if the places must coincide in the undeformed scene.
         advice: Text appended to the error if the places do not coincide.
         is_rod: True if files show a line from place to place.
+        in_plane: Joint to use in the plane instead, of joints for scenes in space.
 
     Example:
         >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
@@ -72,6 +74,7 @@ class Joint(Bearing, Record, ABC):
     meets: bool = False
     advice: str = "RigidLink and Link join places that are apart"
     is_rod: ClassVar[bool] = False
+    in_plane: ClassVar[str] = ""
 
     __repr__ = bracketed
 
@@ -82,7 +85,18 @@ class Joint(Bearing, Record, ABC):
     def __post_init__(self) -> None:
         places = (x for x in vars(self).values() if isinstance(x, Place | BodyPoint))
         vars(self).setdefault("places", tuple(places))
+        self._require_dimension()
         super().__post_init__()
+
+    def _require_dimension(self) -> None:
+        """Raise :class:`ModelError` unless all places are in the plane, or in space."""
+        places = [x for x in self.places if isinstance(x, Place | BodyPoint)]
+        require_one_dimension(self, places)
+        if self.in_plane and any(len(x.point) == 2 for x in places):
+            raise ModelError(
+                f"{type(self).__name__}: the joint is for scenes in space; use {self.in_plane} in "
+                "the plane"
+            )
 
     def __str__(self) -> str:
         return f"{type(self).__name__}({', '.join(map(str, self.places))})"
@@ -98,15 +112,6 @@ class Joint(Bearing, Record, ABC):
         """Return a connector that holds a relative motion of the first two places."""
         a, b = self.places[:2]
         return Component(type(self).__name__, motion, a, b, RIGID, axis, corner, other=other)
-
-
-def _require_in_space(joint: Joint, instead: str) -> None:
-    """Raise :class:`ModelError` if a place of a joint is in the plane."""
-    places = getattr(joint, "places", vars(joint).values())
-    if any(len(getattr(x, "point", ())) == 2 for x in places):
-        raise ModelError(
-            f"{type(joint).__name__}: the joint is for scenes in space; use {instead} in the plane"
-        )
 
 
 class _AtPoint(Joint):
@@ -239,10 +244,7 @@ class Spherical(_AtPoint):
 
     places: tuple[AttachmentPoint, ...]
     multipliers: Switch
-
-    def __post_init__(self) -> None:
-        _require_in_space(self, "Revolute")
-        super().__post_init__()
+    in_plane = "Revolute"
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
@@ -272,6 +274,7 @@ class Universal(_AtPoint):
     places: tuple[AttachmentPoint, ...]
     multipliers: Switch
     axes: Any
+    in_plane = "Revolute"
 
     def __init__(
         self, a: AttachmentPoint, b: AttachmentPoint, *, axes: Sequence[Sequence[float]],
@@ -284,7 +287,7 @@ class Universal(_AtPoint):
         a, b = self.places
         require_place(a, "Universal: a")
         require_place(b, "Universal: b")
-        _require_in_space(self, "Revolute")
+        self._require_dimension()
         try:
             given = np.array(self.axes, dtype=np.float64)
         except (TypeError, ValueError):
@@ -382,10 +385,7 @@ class Cylindrical(_OnRail):
     slider: PlaceField
     _: KW_ONLY
     axis: Point | None = None
-
-    def __post_init__(self) -> None:
-        _require_in_space(self, "Prismatic(turning=True)")
-        super().__post_init__()
+    in_plane = "Prismatic(turning=True)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -26,6 +26,7 @@ from ufl_beam.model.bodies import (
     PointMass,
     Representatives,
     Velocity,
+    base_of,
     merged,
     node,
 )
@@ -194,15 +195,13 @@ class Scene(Record, Rich):
     def _require_one_dimension(self) -> None:
         """Raise unless all vectors have two components, or three in a scene of known kinds."""
         d, of = (3, "in space") if self.in_space else (2, "in the plane")
-        for beam in (b for b in self.beams if len(b.ends[0]) != d):
+        for part in (x for x in self.parts if len(base_of(x).point) != d):
             raise ModelError(
-                f"{beam.name}: its ends have two coordinates, but other beams are in space; give "
+                f"{part.name}: its points have two coordinates, but other parts are in space; give "
                 "all points three coordinates"
             )
         sizes = dict.fromkeys(("force", "acceleration", "linear", "about"), d)
-        sizes |= dict.fromkeys(("moment", "angular", "rate"), 1 if d == 2 else 3) | {
-            "normal": d - 1
-        }
+        sizes |= dict.fromkeys(("moment", "angular", "rate"), 2 * d - 3) | {"normal": d - 1}
         records: list[Record] = [*self.loads, *self.initial]
         for record in records:
             for name, wanted in sizes.items():

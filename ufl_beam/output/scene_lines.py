@@ -14,16 +14,13 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.internal_variables import in_cells
 from ufl_beam.output.recorder import StateView
+from ufl_beam.output.section_forces import Diagram, DiagramInSpace
 
 LineFields = tuple[Mapping[str, Array], Mapping[str, Array]]
 """Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
 
 
 BODY, CONNECTOR = 1, 2  # kinds of lines: bodies, and links or connectors
-
-
-RESULTANTS_IN_SPACE = "N", "V2", "V3", "T", "M2", "M3"
-"""Forces along the axes 1, 2, 3 of a section, and moments about them; N, N m."""
 
 
 class Rod(NamedTuple):
@@ -94,7 +91,7 @@ class LineData:
             at_points[moving] = _in_three(values[:, :d])
             at_points[turning] = values[:, 2] if d == 2 else values[:, d:]
         forces = simulation.section_forces()
-        names = "NVM" if d == 2 else RESULTANTS_IN_SPACE
+        names = (Diagram if d == 2 else DiagramInSpace)._fields[1:]
         fields: dict[str, Array] = dict(zip(names, forces.T, strict=True))
         if simulation.may_break:
             fields["jump"], fields["dissipated energy"] = simulation.damage()

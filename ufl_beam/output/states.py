@@ -511,14 +511,14 @@ class States:
 
     def _in_cells_of_space(self, n: int, pieces: Array, in_scene: bool = False) -> Array:
         """Compute section forces of strains of a state, and of dead loads along cells."""
-        t, cells = float(self._row("t", n)), self._in_space(n)
+        t, cells = float(self._row("t", n)), self.cells_in_space(n)
         along: Array = np.zeros((len(cells.lengths), 2, 3))
         for load, on_nodes in self.cells.loads_in_space:
             along += value_at(load.amplitude, t, load) * on_nodes
         resultants = self.forces_in_middle(n)
         return cells.section_forces(pieces, resultants, along, in_scene=in_scene)
 
-    def _in_space(self, n: int) -> CellsOfState:
+    def cells_in_space(self, n: int) -> CellsOfState:
         """Return the cells in the n-th state of a scene in space."""
         state = self._row("q", n), self._row(TURNS, n)
         return CellsOfState.of(self.numbering, self.cells.axes, *state)
@@ -619,7 +619,7 @@ class States:
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         if self.scene.in_space:
-            return self._in_space(n).strains()
+            return self.cells_in_space(n).strains()
         strains = np.empty((len(self.numbering.cells), 3))
         in_points = self.cells.strains(self._row("q", n)).reshape(len(strains), -1, 3)
         weights = self.numbering.mesh.point_weights

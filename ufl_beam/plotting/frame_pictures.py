@@ -23,7 +23,7 @@ from ufl_beam.plotting.inelastic_pictures import (
     mark_hinges,
     open_hinges,
 )
-from ufl_beam.plotting.labels import MOST, Label, around, arrange, plane_canvas
+from ufl_beam.plotting.labels import Label, around, arrange, fitted_canvas, scene_axes
 from ufl_beam.plotting.positions import (
     Canvas,
     DeformedShape,
@@ -31,7 +31,7 @@ from ufl_beam.plotting.positions import (
     normal,
     unit_vectors,
 )
-from ufl_beam.plotting.style import BLUE, GREY, INK, RED, RESULTANTS, font_size, shade
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, font_size, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
@@ -52,11 +52,20 @@ SIGNS = {
 }
 """Meaning of both signs; the arrow on a beam points from its start to its end."""
 
-Values = tuple[Member, Array]  # a beam, and values at points of its cells; (num_cells points,)
+SIDES = {"V": ["V: in its direction"], "M": ["M: on the side of tension"]}
+"""Meaning of the side of diagrams of vectors in space, which have no sign."""
+
+ORDINATES = np.array(
+    [[0, 1, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64
+)
+"""Directions of ordinates of (N, V2, V3, T, M2, M3) in axes of the section in space."""
+
+Values = tuple[Member, Array]
+"""A beam, and values at points of its cells; (num_cells points, 1), of vectors (..., 2)."""
 
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
-    """Draw the axes of all beams; ``points`` are the drawn nodes, (num_nodes, 2), m."""
+    """Draw the axes of all beams; ``points`` are the drawn nodes, (num_nodes, 2 or 3), m."""
     numbering = solution.numbering
     lines = [points[numbering.nodes_along(beam)] for beam in solution.scene.beams]
     axes.plot(*joined(lines).T, **line)
@@ -81,19 +90,19 @@ def draw_shape(
     """Draw the frame at the n-th recorded time, optionally with the diagram of a section force.
 
     M is drawn on the tension side of a beam.  Positive N and V are drawn on its left, looking from
-    start to end.  Positive values are red, negative values blue.  Values between vertices follow
+    start to end.  In space, V and M are drawn as vectors across the beam, and components along axes
+    of the section.  Positive values are red, negative values blue.  Values between vertices follow
     from equilibrium, see :meth:`Solution.diagram`.  Large peaks are labelled in the unit of the
     title; the largest and the least value are bold.  Yielded or cracked cells are orange.  Open
     hinges are circles as in :func:`draw_damage_state`.
     """
-    shape = plane_canvas(solution, [n], magnify, ax).shape(n)
+    shape = fitted_canvas(solution, [n], magnify, ax).shape(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if quantity == "shape":
         return draw_frame(ax, solution, n, shape, ("shape", when))
-    diagrams = [
-        (beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams
-    ]
-    name = f"{RESULTANTS[quantity][0]} {quantity}"
+    forces = [(b, np.column_stack(solution.diagram(b, n)[1:])) for b in solution.scene.beams]
+    diagrams = [(beam, style.components(x, quantity)) for beam, x in forces]
+    name, _ = style.resultant(quantity)
     return draw_frame(ax, solution, n, shape, (name, when), quantity, diagrams)
 
 
@@ -110,25 +119,33 @@ def draw_frame(
 
     The damage belongs to the n-th recorded time.  The unit is put between both parts of ``title``.
     """
-    sizes = np.array([np.abs(values).max() for _, values in diagrams])
+    sizes = np.array([np.linalg.norm(values, axis=1).max() for _, values in diagrams])
     factor, prefix = style.decimal_prefix(float(sizes.max(initial=0.0)))
     sections, beams = [beam.section for beam, _ in diagrams], {beam for beam, _ in diagrams}
-    stiffness = [{"N": s.EA, "V": s.GA, "M": s.EI / s.depth}[what] for s in sections]
+    stiffness = [
+        s.EI / s.depth if what[0] in "MT" else s.GA if what[0] == "V" else s.EA for s in sections
+    ]
     name, when = title
-    unit = f"({prefix}{RESULTANTS[what][1]})".replace(" ", "\N{NO-BREAK SPACE}") if diagrams else ""
+    unit = (
+        f"({prefix}{style.resultant(what)[1]})".replace(" ", "\N{NO-BREAK SPACE}")
+        if diagrams
+        else ""
+    )
     heading = " ".join(filter(None, (name, unit, when)))
-    with style.panel(ax, MOST) as axes:
-        style.plane_axes(axes, heading)
+    with scene_axes(ax, solution.scene, heading) as axes:
         draw_undeformed(axes, solution, shape.canvas)
         peaks: list[Label] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
-            rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
+            rows = _draw_diagrams(axes, solution, shape, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(beams) <= MOST_BEAMS else 1.0)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.6, zorder=4)
-        draw_strokes(axes, symbols.in_plane(shape))
+        draw_strokes(axes, symbols.all_symbols(shape))
         areas = {area.get_gid(): area for area in axes.collections}
         named: dict[str, Artist] = {}
-        for color, words in zip((RED, BLUE), SIGNS.get(what, ()), strict=False):
+        signs: Sequence[str] = SIGNS.get(what, ())
+        if solution.scene.in_space and what != "N":
+            signs = SIDES.get(what, [f"{what} > 0", f"{what} < 0"])
+        for color, words in zip((RED, BLUE), signs, strict=False):
             if len(beams) > MOST_BEAMS:  # without arrows
                 words = words.replace(" of the arrow", ", from start to end")
             if color in areas:
@@ -146,27 +163,36 @@ def draw_frame(
 
 
 def _draw_diagrams(
-    axes: Axes, solution: Solution, nodes: Array, what: str, diagrams: Sequence[Values]
+    axes: Any, solution: Solution, shape: DeformedShape, what: str, diagrams: Sequence[Values]
 ) -> Array:
     """Draw diagrams of a section force, all to one scale.
 
     Returns:
         The peak of each area, its point on the axis, and the vector from this point to the diagram;
-        (num_areas, 5).
+        (num_areas, 5 or 7).
     """
     from matplotlib.collections import PolyCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    side = -1.0 if what == "M" else 1.0
+    in_space = solution.scene.in_space
     cells_of = [solution.numbering.cells_of(beam) for beam, _ in diagrams]
     cells = np.concatenate(cells_of)
-    values = np.concatenate([values for _, values in diagrams])
+    vectors = np.concatenate([values for _, values in diagrams])
+    values = vectors[:, 0] if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)
     points, largest = len(values) // len(cells), float(np.abs(values).max())
-    scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
-    values = np.where(np.abs(values) > DRAWN_AS_ZERO * largest, values, 0.0)
+    scale = 0.13 * math.hypot(*np.ptp(shape.nodes, axis=0)) / largest
+    drawn = np.abs(values) > DRAWN_AS_ZERO * largest
+    values = np.where(drawn, values, 0.0)
     # A beam may have several diagrams, which are not connected.
     diagram = np.repeat(np.arange(len(diagrams)), [len(beam_cells) for beam_cells in cells_of])
-    axis, left = _along(solution, cells, diagram, nodes, points)
-    ordinates = scale * values[:, None] * left
+    axis, left = _along(solution, cells, diagram, shape.nodes, points)
+    if in_space:
+        fractions = np.linspace(0.0, 1.0, points).astype(float)
+        frames = shape.section_axes(fractions)[cells].reshape(-1, 3, 3)
+        ways = np.einsum("pik,ck->pci", frames, ORDINATES[style.COLUMNS[what]])
+    else:
+        ways = left[:, None] * (-1.0 if what == "M" else 1.0)
+    ordinates = scale * np.einsum("pc,pci->pi", np.where(drawn[:, None], vectors, 0.0), ways)
     rows: list[Array] = []
     outlines: defaultdict[str, list[Array]] = defaultdict(list)
     diagram = np.repeat(diagram, points)
@@ -174,7 +200,7 @@ def _draw_diagrams(
         outlines[RED if peak > 0 else BLUE].append(outline)
         rows.append(np.array([peak, *axis[k], *ordinates[k]]))
     firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
-    if what != "N" and len(firsts) <= MOST_BEAMS:
+    if what != "N" and len(firsts) <= MOST_BEAMS and not in_space:
         for k in firsts.values():
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
@@ -183,7 +209,10 @@ def _draw_diagrams(
             axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
-        axes.add_collection(PolyCollection(group, **look, linewidths=1.0, zorder=2))
+        kind = Poly3DCollection if in_space else PolyCollection
+        axes.add_collection(kind(group, **look, linewidths=1.0, zorder=2))
+        if in_space:
+            axes.auto_scale_xyz(*np.concatenate(group).T, had_data=True)
     return np.array(rows)
 
 
@@ -192,7 +221,7 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Label]:
 
     Large peaks exceed ``least`` times the largest magnitude.  Equal peaks at a point are one peak.
     """
-    values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
+    values, (axis, up) = rows[:, 0], np.split(rows[:, 1:], 2, axis=1)
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
     order, largest = np.argsort(-np.abs(values), kind="stable"), np.abs(values).max()
@@ -216,7 +245,7 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Label]:
 def _along(
     solution: Solution, cells: Index, diagram: Index, nodes: Array, points: int
 ) -> tuple[Array, Array]:
-    """Return points of the drawn axes and unit vectors to their left; both (num_cells points, 2).
+    """Return points of the drawn axes and vectors to their left; both (num_cells points, 2 or 3).
 
     ``diagram`` has the number of each cell's diagram, ``points`` is the number of points of a cell.
     """
@@ -225,13 +254,14 @@ def _along(
     ahead = unit_vectors(mesh.slopes(fractions) @ lines)
     # Ordinates at corners between cells of a beam bisect the angle; ordinates near a corner lean
     # towards the bisector.
-    lean = np.zeros((len(lines), 2, 2))
+    lean = np.zeros((len(lines), 2, nodes.shape[1]))
     k = np.flatnonzero(diagram[:-1] == diagram[1:])
     half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
     lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
     ahead = ahead + np.column_stack([1.0 - fractions, fractions]) @ lean
     left = normal(unit_vectors(ahead))
-    return (mesh.weights(fractions) @ lines).reshape(-1, 2), left.reshape(-1, 2)
+    axis = mesh.weights(fractions) @ lines
+    return axis.reshape(-1, nodes.shape[1]), left.reshape(-1, nodes.shape[1])
 
 
 def _areas(
@@ -240,18 +270,22 @@ def _areas(
     """Divide diagrams into areas of one sign; ``diagram`` has the number of each point's diagram.
 
     Yields:
-        Outline (n, 2), m, of an area; its value of the largest magnitude; index of the point with
-        this value, the middle one of several.
+        Outline (n, 2 or 3), m, of an area; its value of the largest magnitude; index of the point
+        with this value, the middle one of several.
     """
-    points = np.column_stack([axis, tips, values, diagram, np.arange(len(values))])
+    d, points = (
+        axis.shape[1],
+        np.column_stack([axis, tips, values, diagram, np.arange(len(values))]),
+    )
     # Where the sign changes, both areas end at a point on the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     fraction = values[first] / (values[first] - values[first + 1])
     zeros = points[first]
-    zeros[:, :2] += fraction[:, None] * (axis[first + 1] - axis[first])
-    zeros[:, 2:4], zeros[:, 4] = zeros[:, :2], 0.0
+    zeros[:, :d] += fraction[:, None] * (axis[first + 1] - axis[first])
+    zeros[:, d : 2 * d], zeros[:, 2 * d] = zeros[:, :d], 0.0
     points = np.insert(points, first + 1, zeros, axis=0)
-    axis, tips, (values, diagram, places) = points[:, :2], points[:, 2:4], points[:, 4:].T
+    axis, tips = points[:, :d], points[:, d : 2 * d]
+    values, diagram, places = points[:, 2 * d :].T
     signs = np.where(diagram[:-1] == diagram[1:], np.sign(values[:-1] + values[1:]), 0.0)
     ends = np.flatnonzero(np.diff(signs, append=np.nan))
     for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
@@ -275,7 +309,7 @@ def draw_envelope(
     n: int = 0,
 ) -> Figure:
     """Draw diagrams of a section force, and damage at a time, on the undeformed frame."""
-    shape = plane_canvas(solution, [], ax=ax).undeformed
+    shape = fitted_canvas(solution, [], ax=ax).undeformed
     return draw_frame(ax, solution, n, shape, title, quantity, diagrams)
 
 
@@ -297,14 +331,13 @@ def draw_damage_state(
     if not any(map(can_yield, solution.scene.connectors)):
         for beam in solution.scene.beams[:1]:
             solution.material(beam)  # raises if the scene is elastic
-    canvas = plane_canvas(solution, [n], magnify, ax)
+    canvas = fitted_canvas(solution, [n], magnify, ax)
     shape, density = canvas.shape(n), dissipated_per_length(solution, n)
-    with style.panel(ax, MOST) as axes:
-        time = solution.parameter.at(solution.times[n])
-        style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
+    title = f"damage at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
+    with scene_axes(ax, solution.scene, title) as axes:
         draw_undeformed(axes, solution, canvas)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.0, zorder=2)
-        draw_strokes(axes, symbols.in_plane(shape))
+        draw_strokes(axes, symbols.all_symbols(shape))
         yielded = density > 0.0
         if yielded.any():
             unit, prefix = style.decimal_prefix(float(density.max()))

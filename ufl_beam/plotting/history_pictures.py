@@ -23,9 +23,8 @@ from ufl_beam.plotting.frame_pictures import (
     draw_outlines,
     draw_undeformed,
 )
-from ufl_beam.plotting.labels import MOST, arrange, plane_canvas
+from ufl_beam.plotting.labels import arrange, fitted_canvas, scene_axes
 from ufl_beam.plotting.positions import evenly
-from ufl_beam.plotting.space_pictures import draw_shapes_in_space
 from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
@@ -34,24 +33,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COMPONENTS = {
-    "u": ("displacement", "m"), "v": ("displacement", "m"), "psi": ("rotation", "rad"),
-    "du/dt": ("velocity", "m/s"), "dv/dt": ("velocity", "m/s"),
-    "dpsi/dt": ("angular velocity", "rad/s"),
-    "d2u/dt2": ("acceleration", "m/s²"), "d2v/dt2": ("acceleration", "m/s²"),
-    "d2psi/dt2": ("angular acceleration", "rad/s²"),
-}  # fmt: skip
 
-COMPONENTS_IN_SPACE = {
-    f"{before}{name}{after}": (words[k], (f"m{per}", f"rad{per}")[k])
-    for before, after, per, *words in (
+def _components(names: Sequence[str], rotations: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return words and units of displacements and rotations, their rates and second rates."""
+    orders = (
         ("", "", "", "displacement", "rotation"),
         ("d", "/dt", "/s", "velocity", "angular velocity"),
         ("d2", "/dt2", "/s²", "acceleration", "angular acceleration"),
     )
-    for k, names in enumerate((("u", "v", "w"), ("rx", "ry", "rz"))) for name in names
-}  # fmt: skip
-"""The same in space; rx, ry, rz are components of the rotation vector."""
+    return {
+        f"{before}{name}{after}": (words[name in rotations], ("m", "rad")[name in rotations] + per)
+        for before, after, per, *words in orders for name in (*names, *rotations)
+    }  # fmt: skip
+
+
+COMPONENTS = {2: _components("uv", ["psi"]), 3: _components("uvw", ["rx", "ry", "rz"])}
+"""Components of motions by the number of displacements; rx, ry, rz: of the rotation vector."""
 
 MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, in a notebook
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
@@ -87,13 +84,10 @@ def draw_shapes(
         if not len(requested):
             raise ArgumentError("plot: times is empty; give times (s), or count=")
         chosen = [int(np.argmin(np.abs(instants - t))) for t in np.sort(requested)]
-    if solution.scene.in_space:
-        return draw_shapes_in_space(solution, chosen, magnify, ax)
-    canvas, along = plane_canvas(solution, chosen, magnify, ax), solution.progress
+    canvas, along = fitted_canvas(solution, chosen, magnify, ax), solution.progress
     shapes = [canvas.shape(n) for n in chosen]
-    with style.panel(ax, MOST) as axes:
+    with scene_axes(ax, solution.scene, style.magnified(magnify, "")) as axes:
         colors = style.scale("viridis", 0.0, 0.88, *np.sort(along[chosen])[[0, -1]])
-        style.plane_axes(axes, style.magnified(magnify, ""))
         draw_undeformed(axes, solution, canvas)
         for shape, color in zip(shapes, map(to_hex, colors.to_rgba(along[chosen])), strict=True):
             moving = *symbols.bodies(shape), *symbols.rods(shape)
@@ -103,7 +97,9 @@ def draw_shapes(
         last = shapes[-1]
         still = *symbols.rails(last), *symbols.connectors(last), *symbols.supports(last)
         draw_strokes(axes, {"still": still})
-        bar = style.draw_bar(axes, colors, solution.parameter.name)
+        bar = style.draw_bar(
+            axes, colors, solution.parameter.name, 0.1 if solution.scene.in_space else 0.02
+        )
         if solution.parameter.progress != solution.parameter.name:
             bar.formatter = lambda x, _: style.number(np.interp(x, along, instants))
         arrange(axes, ax)
@@ -134,7 +130,7 @@ def draw_history(
     ax: Axes | None = None,
 ) -> Figure:
     """Draw a component of the motion of one or more places over time."""
-    components = COMPONENTS_IN_SPACE if solution.scene.in_space else COMPONENTS
+    components = COMPONENTS[solution.numbering.displacements]
     style.require_option(component, components, "plot: component")
     followed = (places,) if isinstance(places, AttachmentPoint) else places
     followed = require_all(followed, "plot: places", (Place, BodyPoint))
@@ -202,7 +198,7 @@ def draw_modes(
     if not chosen:
         raise ArgumentError(f"plot: {'numbers is empty' if len(shapes) else 'there is no shape'}")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
-    stages = [plane_canvas(swing, [0, 1], size=(4.0, np.inf)) for swing in swings]
+    stages = [fitted_canvas(swing, [0, 1], size=(4.0, np.inf)) for swing in swings]
     box = np.concatenate([canvas.points() for canvas in stages])
     # space for the symbols of supports
     margin = 0.08 * np.hypot(*np.ptp(box, axis=0))
@@ -219,7 +215,7 @@ def draw_modes(
             draw_undeformed(axes, swing, canvas)
             draw_outlines(axes, swing, backward, color=SKY, linewidth=1.6, zorder=2)
             draw_beams(axes, swing, forward.nodes, color=BLUE, linewidth=2.6, zorder=4)
-            draw_strokes(axes, symbols.in_plane(forward))
+            draw_strokes(axes, symbols.all_symbols(forward))
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
             axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
     return figure
@@ -242,13 +238,13 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     """
     solution = extremes.solution
     until = f"until {solution.parameter.at(solution.times[-1])}"
-    title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
+    title = f"extremes of the {style.resultant(quantity)[0]}", until
     diagrams = bounds(solution, extremes, quantity)
     return draw_envelope(solution, title, quantity, diagrams, ax, n=-1)
 
 
 def bounds(solution: Solution, found: Any, quantity: str) -> list[Values]:
     """Return the largest and the least values of a section force along each beam."""
-    index, beams = list(style.RESULTANTS).index(quantity), solution.scene.beams
-    extents = [(beam, found.section_forces(beam)) for beam in beams]
-    return [(beam, values[:, index]) for beam, x in extents for values in (x.high, x.low)]
+    extents = [(beam, found.section_forces(beam)) for beam in solution.scene.beams]
+    pairs = [(beam, values) for beam, x in extents for values in (x.high, x.low)]
+    return [(beam, style.components(values, quantity)) for beam, values in pairs]

@@ -87,7 +87,8 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
     numbering = solution.numbering
     energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:
-        if not all(points.elastic for points in beam.section.section_points(None)):
+        points = beam.section.section_points(None, solution.scene.in_space)
+        if not all(some.elastic for some in points):
             state = solution.material(beam, n)
             cracks = state.hinge if beam.section.fibres is not None else 0.0
             energy[numbering.cells_of(beam)] = state.plastic + cracks

@@ -1,18 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Labels of pictures of the plane, and sizes of figures that the pictures fill."""
+"""Labels of pictures of scenes, and axes and sizes of figures that the pictures fill."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.errors import ArgumentError
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.states import States
 from ufl_beam.plotting import style
-from ufl_beam.plotting.positions import Canvas, directions, joined, segments
+from ufl_beam.plotting.positions import (
+    FROM_A_SIDE,
+    PICTURE,
+    Canvas,
+    directions,
+    joined,
+    segments,
+)
 from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, font_size, shade
 
 if TYPE_CHECKING:
@@ -22,6 +32,10 @@ if TYPE_CHECKING:
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Space for words and numbers around the axes, least size and largest size of a figure; inch."""
 
+SIZE = 8.6, 6.2
+"""Size of new figures of scenes in space; inch."""
+
+LEAST_WIDTH = 0.25  # least extent along an axis in space, as a fraction of the largest one
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 GAPS = (4.0, 14.0)  # candidate distances of a label from its point; points
 TICKS = 55.0, 26.0  # least distances of ticks along x and y; points
@@ -30,10 +44,43 @@ SPACE = np.array([4.0, 0.0])  # further clearance between labels; points
 CLEARANCE = 2.0  # clearance around a label; points
 AREAS = RED, BLUE  # groups of filled areas that labels should not cover
 
-Spot = tuple[Array, Array]  # point, and the direction from there to a label; (2,) each
+Spot = tuple[Array, Array]  # point, and the direction from there to a label; (2,) or (3,) each
 
 
-def plane_canvas(
+@contextmanager
+def scene_axes(ax: Axes | None, scene: Scene, title: str) -> Iterator[Any]:
+    """Open axes of a scene, in space with z up; :func:`arrange` sets their limits."""
+    if scene.in_space and ax is not None and not hasattr(ax, "get_zlim"):
+        raise ArgumentError(
+            "plot: a scene in space needs axes in space, such as "
+            'figure.add_subplot(projection="3d")'
+        )
+    size, projection = (SIZE, "3d") if scene.in_space else (MOST, None)
+    with style.panel(ax, size, projection) as axes:
+        if scene.in_space:
+            _set_up_in_space(axes, title)
+        else:
+            style.plane_axes(axes, title)
+        yield axes
+
+
+def _set_up_in_space(axes: Any, title: str) -> None:
+    """Set up axes of a scene in space, seen from a side without perspective."""
+    axes.set_proj_type("ortho")
+    x, y, z = -FROM_A_SIDE
+    elevation = math.degrees(math.atan2(z, math.hypot(x, y)))
+    axes.view_init(elev=elevation, azim=math.degrees(math.atan2(y, x)))
+    axes.computed_zorder = False
+    for name in "xyz":
+        axis = getattr(axes, f"{name}axis")
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
+        axis.set_label_text(f"{name} (m)")
+        axis.labelpad = 7.0
+        axis.set_tick_params(labelsize=font_size(10.5))
+    axes.set_title(title, loc="left")
+
+
+def fitted_canvas(
     subject: Scene | States,
     shown: Sequence[int] = (),
     magnify: float = 1.0,
@@ -48,6 +95,8 @@ def plane_canvas(
     scene = subject.scene if isinstance(subject, States) else subject
     points = Canvas(subject, magnify, 0.02 * scene.size, shown).points()
     space = POINTS * np.array(size) if ax is None else style.lay_out(ax)
+    if scene.in_space:  # beside the scales of three axes
+        points, filled = points @ PICTURE[3].T, 0.6 * filled
     # A scene may be a single point.
     scale = max(*np.ptp(points, axis=0) / (filled * space), 1e-3 * scene.size)
     return Canvas.at_scale(subject, magnify, scale, shown)
@@ -62,19 +111,27 @@ class Label(NamedTuple):
     bold: bool = False  # bold labels are larger
 
 
-def around(point: Any, outward: Any = (1.0, 0.0), radius: float = 0.0) -> list[Spot]:
-    """List positions of a label around a point, from a direction more and more to both sides."""
-    tilts = np.radians((0, 45, -45, 90, -90, 135, -135, 180))
-    ways = directions(np.arctan2(outward[1], outward[0]) + tilts)
+def around(point: Any, outward: Any = None, radius: float = 0.0) -> list[Spot]:
+    """List positions of a label around a point, from a direction more and more to both sides.
+
+    The first direction is to the right by default.
+    """
+    axes, tilts = PICTURE[len(point)], np.radians((0, 45, -45, 90, -90, 135, -135, 180))
+    x, y = axes @ (axes[0] if outward is None else outward)
+    ways = directions(np.arctan2(y, x) + tilts) @ axes
     return [(point + radius * way, way) for way in ways]
 
 
 def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: float = 0.0) -> None:
-    """Write labels of a picture of the plane; fit limits and figure to the drawing and its labels.
+    """Write labels of a picture of a scene; fit limits and figure to the drawing and its labels.
 
     The first labels have the best places.  The drawing is as large as possible, or a point is at
-    least ``scale`` (m) long.  The user's axes ``ax`` keep their size.
+    least ``scale`` (m) long.  The user's axes ``ax`` and figures in space keep their size.
     """
+    if hasattr(axes, "get_zlim"):
+        _fit_in_space(axes)
+        write_labels(axes, [x._replace(spots=_in_picture(axes, x.spots)) for x in labels])
+        return
     axes.margins(MARGIN)
     drawn, written = axes.dataLim.frozen(), list[Any]()
     # Space for labels changes the scale, which moves the lines that labels should not cover.
@@ -91,6 +148,30 @@ def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: fl
             x, y = axes.transData.transform(axes.dataLim.min)
             axes.update_datalim([to_data.transform((x, y - legend.get_window_extent().height))])
     _fit(axes, ax, scale)
+
+
+def _fit_in_space(axes: Any) -> None:
+    """Fit limits and numbers of ticks of axes in space to the data, with equal scales."""
+    from matplotlib.ticker import MaxNLocator
+
+    xy, zz = axes.xy_dataLim, axes.zz_dataLim
+    low, high = np.array([xy.intervalx, xy.intervaly, zz.intervalx]).T
+    half = 0.54 * np.maximum(high - low, LEAST_WIDTH * np.max(high - low))
+    for name, at, width in zip("xyz", (low + high) / 2, half, strict=True):
+        getattr(axes, f"set_{name}lim")(at - width, at + width)
+        locator = MaxNLocator(max(1, round(5 * width / half.max())), min_n_ticks=1)
+        getattr(axes, f"{name}axis").set_major_locator(locator)
+    axes.set_box_aspect(half, zoom=0.9)
+    style.lay_out(axes)
+    style.parent_figure(axes).draw_without_rendering()  # projects lines and areas
+
+
+def _in_picture(axes: Any, spots: Sequence[Spot]) -> list[Spot]:
+    """Project positions of a label in space."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    M = axes.get_proj()
+    return [(np.array(proj_transform(*at, M)[:2]), PICTURE[3] @ way) for at, way in spots]
 
 
 def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:

@@ -36,12 +36,11 @@ from ufl_beam.model.loads import (
     RotatingFrame,
 )
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.model.supports import Support
 from ufl_beam.model.works import Effect
 from ufl_beam.plotting import notebook, positions, style, symbols
-from ufl_beam.plotting.labels import MOST, Label, Spot, around, arrange, plane_canvas
-from ufl_beam.plotting.positions import directions, normal, points_along, unit_vectors
-from ufl_beam.plotting.space_pictures import draw_model_in_space
+from ufl_beam.plotting.labels import Label, Spot, around, arrange, fitted_canvas, scene_axes
+from ufl_beam.plotting.positions import PICTURE, directions, normal, points_along, unit_vectors
 from ufl_beam.plotting.style import (
     BLUE,
     GREEN,
@@ -83,19 +82,19 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
 
     It shows beams, their cells and names, bodies, joints, supports, connectors with parameters,
     hinges, loads (red), masses, prescribed motions (orange) and initial velocities (green).  Loads
-    that turn with their place have hollow arrow heads.  Drives that prescribe
-    a motion are filled with orange; drives that prescribe a force are hollow.  Notes above the axes
-    replace many equal labels.  Labels for which there is no space are omitted.
+    that turn with their place have hollow arrow heads.  In space, moments and angular velocities
+    are arrows with two heads along their vectors.  Drives that prescribe a motion are filled with
+    orange; drives that prescribe a force are hollow.  Notes above the axes replace many equal
+    labels.  Labels for which there is no space are omitted.
     """
-    if scene.in_space:
-        return draw_model_in_space(scene, ax=ax)
-    require_independent(scene)
-    with style.panel(ax, MOST) as axes:
-        drawing = Drawing(plane_canvas(scene, ax=ax, filled=0.7))  # with space for loads
+    if not scene.in_space:
+        require_independent(scene)
+    with scene_axes(ax, scene, "") as axes:
+        drawing = Drawing(fitted_canvas(scene, ax=ax, filled=0.7))  # with space for loads
         labels, repeated = drawing.grouped()
         cells = sum(len(axis) - 1 for axis in drawing.axes.values()), "cell", "cells"
         beams, bodies = (len(scene.beams), "beam", "beams"), (len(scene.bodies), "body", "bodies")
-        style.plane_axes(axes, f"model: {counted(beams, cells, bodies)}")
+        axes.set_title(f"model: {counted(beams, cells, bodies)}", loc="left", wrap=True)
         notes = [(words, color, "", 0.0) for words, color in hinge_groups(scene)[0].items()]
         notes += [(words, color, "", 0.0) for words, color in repeated.items()]
         notes += [(words, TEXT, "", 0.0) for words in model_notes(scene)]
@@ -155,12 +154,14 @@ def model_notes(scene: Scene) -> list[str]:
 def scene_load_caption(load: Load) -> tuple[str, str, float]:
     """Return text, arrow and its angle (degrees) of a load on the whole scene; else empty texts."""
     if isinstance(load, Gravity):
-        x, y = load.acceleration
-        size, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
+        x, y = PICTURE[len(load.acceleration)] @ load.acceleration
+        size, angle = math.hypot(*load.acceleration), math.degrees(math.atan2(y, x))
         return in_time(f"g = {size:.4g} m/s²", load.amplitude), "→" if size else "", angle
     if isinstance(load, RotatingFrame):
-        x, y = load.about
-        text = f"frame: {load.rate:.4g} rad/s about ({x:g}, {y:g})".replace("-", "−")
+        rate, about = (", ".join(f"{x:.4g}" for x in np.ravel(y)) for y in (load.rate, load.about))
+        if np.size(load.rate) == 3:
+            return f"frame: ({rate}) rad/s about ({about})".replace("-", "−"), "", 0.0
+        text = f"frame: {rate} rad/s about ({about})".replace("-", "−")
         return text, "↺" if load.rate >= 0 else "↻", 0.0
     return "", "", 0.0
 
@@ -185,12 +186,12 @@ class Drawing:
         self.labels: defaultdict[tuple[str, str, str], list[Sequence[Spot]]] = defaultdict(list)
         """Candidate positions of labels by kind, text and colour."""
         self._stacks: defaultdict[object, float] = defaultdict(float)  # heights; m
-        self.axes: dict[Member, Array] = {  # vertices; (n, 2)
+        self.axes: dict[Member, Array] = {  # vertices; (n, 2 or 3)
             beam: np.array([beam.curve(s) for s in beam.vertices(attached[beam])], float)
             for beam in scene.beams
         }
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
-        self._ends: Array = np.reshape(ends, (-1, 2, 2))
+        self._ends: Array = np.reshape(ends, (-1, 2, 3 if scene.in_space else 2))
         forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace | MovingLoad)]
         along = [x for x in scene.loads if isinstance(x, LoadAlongBeam)]
         lines = [np.abs(self.line(x)[1]).max() * _components(x) for x in along]
@@ -199,7 +200,7 @@ class Drawing:
             for vectors in (forces, lines)
         )
         _draw_beams(self)
-        for group, strokes in symbols.in_plane(self.shape).items():
+        for group, strokes in symbols.all_symbols(self.shape).items():
             self.strokes[group] += strokes
         _draw_hinges(self)
         parts = scene.loads, scene.supports, scene.initial, scene.masses, scene.connectors
@@ -246,18 +247,18 @@ class Drawing:
         return axis, load.strains(s) if isinstance(load, ImposedStrain) else load.factors(s)
 
     def directions_at(self, place: AttachmentPoint) -> Array:
-        """Return the directions in which beams leave a place; (n, 2)."""
+        """Return the directions in which beams leave a place; (n, 2 or 3)."""
         close = np.abs(self._ends[:, 0] - place.point).max(axis=1) < 1e-7 * self.scene.size
         pairs = [*self._ends[close]]
         if isinstance(place, Place) and 0.0 < place.s < 1.0:
             axis = self.axes[place.beam]
             k = int(np.argmin(np.linalg.norm(axis - place.point, axis=1)))
             pairs += [axis[[k, j]] for j in (k - 1, k + 1) if 0 <= j < len(axis)]
-        start, end = np.reshape(pairs, (-1, 2, 2)).swapaxes(0, 1)
+        start, end = np.reshape(pairs, (-1, 2, len(place.point))).swapaxes(0, 1)
         return unit_vectors(end - start)
 
     def velocity_points(self, member: Member | Body) -> Array:
-        """Return points for velocities: ends and middle of a beam, or centre of a body; (n, 2)."""
+        """Return points for velocities: ends and middle of a beam, or centre of a body."""
         if isinstance(member, Body):
             return np.array([member.center])
         return points_along(self.axes[member], [0.0, 0.5, 1.0])
@@ -405,6 +406,22 @@ def _arc(center: Any, radius: float, sense: float) -> Array:
     return np.asarray(center + radius * directions(np.radians(90.0 + angles)))
 
 
+def _turning(
+    at: Any, vector: Any, radius: float, color: str, unit: float, *, hollow: bool = False
+) -> tuple[list[Stroke], list[Spot]]:
+    """Draw the arrow of a moment or spin, with positions of its label.
+
+    In the plane it is an arc, in space an arrow with two heads along the vector.
+    """
+    if np.size(vector) == 1:
+        strokes = _arrow(_arc(at, radius, vector), color, unit, hollow=hollow)
+        return strokes, around(at, radius=radius)
+    ahead = 2.0 * radius * unit_vectors(np.array(vector, dtype=np.float64))
+    lines = (at + np.outer((0.0, length), ahead) for length in (1.0, 0.8))
+    strokes = [x for line in lines for x in _arrow(line, color, unit, hollow=hollow)]
+    return strokes, around(at + ahead, ahead)
+
+
 def in_time(text: str, time: TimeFunction) -> str:
     """Mark the text of a quantity that varies in time."""
     return text if time == steady else f"{text} × f(t)"
@@ -417,14 +434,16 @@ def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
     """Draw arrows of force and moment; follower loads have hollow heads."""
     hollow = isinstance(load, FollowerLoad)
     more = ", follows" if hollow else ""
-    if any(load.force) or not load.moment:
+    if any(load.force) or not np.any(load.moment):
         _draw_force(drawing, load.place, load, more, hollow=hollow)
-    if load.moment:
+    if np.any(load.moment):
         at, unit = load.place.point, drawing.outside
         radius = 1.7 * unit + drawing.stack((at, "moment"), 0.8 * unit)
-        drawing.strokes["loads"] += _arrow(_arc(at, radius, load.moment), RED, unit, hollow=hollow)
-        text = in_time(with_unit(abs(load.moment), "N m"), load.amplitude) + more
-        drawing.write(text, RED, "moments", around(at, radius=radius))
+        strokes, spots = _turning(at, load.moment, radius, RED, unit, hollow=hollow)
+        drawing.strokes["loads"] += strokes
+        size = float(np.linalg.norm(load.moment))
+        text = in_time(with_unit(size, "N m"), load.amplitude) + more
+        drawing.write(text, RED, "moments", spots)
 
 
 def _draw_moving_load(drawing: Drawing, load: MovingLoad) -> None:
@@ -473,9 +492,13 @@ def _draw_force(
 
 
 def _components(load: LoadAlongBeam) -> Array:
-    """Return the force per length along x and y, or along the axis and its normal; (2,); N/m."""
+    """Return the force per length along x and y, or along the axis and its normal; (2,); N/m.
+
+    In space, it is along x, y and z, or along the axes 1, 2 and 3 of the section; (3,).
+    """
     if isinstance(load, Pressure):
-        return np.array([load.tangential, load.normal])
+        across = len(load.beam.start.point) - 1  # number of normals
+        return np.array([load.tangential, *np.broadcast_to(load.normal, across)])
     assert isinstance(load, LineLoad)
     return np.array(load.force)
 
@@ -492,9 +515,15 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
     shares = factors / largest if largest else factors
     lengths = positions.lengths_along(axis)
     ways: Array = np.tile(force / (size or 1.0), (len(axis), 1))  # direction at each point
+    in_space = axis.shape[1] == 3
     if follows:
         tangents = unit_vectors(np.gradient(axis, lengths, axis=0))
-        ways = ways[:, :1] * tangents + ways[:, 1:] * normal(tangents)
+        frame = [tangents, normal(tangents)]
+        if in_space:
+            beam: Any = load.beam
+            third = unit_vectors(np.cross(tangents, beam.up))
+            frame = [tangents, np.asarray(np.cross(third, tangents)), third]
+        ways = np.einsum("nk,kni->ni", ways, frame)
 
     def spaced(distance: float, least: float, *, ends: bool = False) -> list[Any]:
         """List points about ``distance`` (m) apart with shares above ``least``, and directions."""
@@ -513,6 +542,9 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
     if size > 0.0:
         direction, chord = force / size, axis[-1] - axis[0]
         across = direction[1] if follows else normal(chord) @ direction / np.linalg.norm(chord)
+        heading, turned = ways[len(ways) // 2], follows and not in_space
+        if in_space:
+            across = np.linalg.norm(np.cross(chord, heading)) / np.linalg.norm(chord)
         if abs(across) > 0.25:
             height = (1.3 + 1.1 * size / drawing.line_load) * unit
             key = load.beam, *np.round(direction, 6)
@@ -522,7 +554,7 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
             for foot, share, heading in spaced(2.0 * unit, 0.5 * unit / height, ends=True):
                 draw(foot - np.outer((low + height * abs(share), low), heading), share)
             spots = [
-                (at, side * (left if (across if follows else left @ direction) < 0 else -left))
+                (at, side * (left if (across if turned else left @ heading) < 0 else -left))
                 for at, left in _normals(line)
                 for side in (1.0, -1.0)
             ]
@@ -574,22 +606,24 @@ def _draw_prescribed(drawing: Drawing, support: Support) -> None:
     """Draw motions that a support prescribes, as arrows with hollow heads."""
     at, unit = np.array(support.place.point), drawing.outside
     ways = drawing.directions_at(support.place)
-    inward = ways[0] if len(ways) else np.array([0.0, 1.0])
+    inward = ways[0] if len(ways) else PICTURE[len(at)][1]
+    d = support.displacements
     for component, motion in support.moving.items():
-        name, symbol = COMPONENTS[component].replace("psi", "ψ"), ("m", "m", "rad")[component]
+        name, symbol = support.names[component].replace("psi", "ψ"), "m" if component < d else "rad"
         values = {float(motion(t)) for t in (0.0, 0.3, 1.0, 7.1)}
         text = f"{name} = {with_unit(values.pop(), symbol)}" if len(values) == 1 else f"{name}(t)"
-        if component == 2:
-            radius = 1.9 * unit
-            line, spots = _arc(at, radius, 1.0), around(at, radius=radius)
+        if component >= d:
+            vector = 1.0 if d == 2 else support.axis
+            strokes, spots = _turning(at, vector, 1.9 * unit, MOVED, unit, hollow=True)
         else:
-            direction = directions(support.angle + component * math.pi / 2)
+            direction = support.axes[component, :d]
             # Beside the place, on the side from which no beam comes.
             left = normal(direction)
             side = left if left @ inward <= 1e-9 else -left
             line = at + 1.5 * unit * side + np.outer((0.0, 2.6 * unit), direction)
             spots = around(line.mean(axis=0), side)
-        drawing.strokes["motions"] += _arrow(line, MOVED, unit, hollow=True)
+            strokes = _arrow(line, MOVED, unit, hollow=True)
+        drawing.strokes["motions"] += strokes
         drawing.write(text, MOVED, "motions", spots)
 
 
@@ -599,20 +633,22 @@ def _draw_velocity(drawing: Drawing, velocity: Velocity) -> None:
     points = [at for member in velocity.beams for at in drawing.velocity_points(member)]
     if not points:
         return
-    speeds = np.array([math.hypot(*velocity.at(*at)[:2]) for at in points])
+    vectors = [np.array(velocity.at(*at)[: len(at)]) for at in points]
+    speeds, spin = np.linalg.norm(vectors, axis=1), float(np.linalg.norm(velocity.angular))
     largest = float(speeds.max(initial=0.0))
-    spots = around(points[0], radius=1.8 * unit * bool(velocity.angular))
-    for at, speed in zip(points, speeds, strict=True):
+    spots = around(points[0], radius=1.8 * unit * bool(spin))
+    for at, vector, speed in zip(points, vectors, speeds, strict=True):
         if speed > 0.05 * largest:
-            way = np.array(velocity.at(*at)[:2]) / speed
+            way = vector / speed
             tip = at + (1.6 + 2.0 * speed / largest) * unit * way
             drawing.strokes["velocities"] += _arrow(np.array([at, tip]), GREEN, unit, size=0.8)
             spots = around(tip, way) if speed == largest else spots
-    for body in bodies if velocity.angular else ():
-        line = _arc(body.center, 1.5 * unit, velocity.angular)
-        drawing.strokes["velocities"] += _arrow(line, GREEN, 0.8 * unit)
-    spin = f"{number(velocity.angular)} rad/s" if velocity.angular else ""
-    text = with_unit(largest, "m/s") + f" ({spin})" * bool(spin) if largest else spin or "0 m/s"
+    for body in bodies if spin else ():
+        strokes, _ = _turning(body.center, velocity.angular, 1.5 * unit, GREEN, 0.8 * unit)
+        drawing.strokes["velocities"] += strokes
+    size = velocity.angular if np.size(velocity.angular) == 1 else spin
+    turns = f"{number(size)} rad/s" if spin else ""
+    text = with_unit(largest, "m/s") + f" ({turns})" * bool(spin) if largest else turns or "0 m/s"
     drawing.write(text, GREEN, "velocities", spots)
 
 

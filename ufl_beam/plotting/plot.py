@@ -31,13 +31,7 @@ from ufl_beam.plotting.inelastic_pictures import (
 )
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
-from ufl_beam.plotting.space_pictures import (
-    COMPONENTS,
-    DIAGRAMS,
-    draw_extremes_in_space,
-    draw_shape_in_space,
-)
-from ufl_beam.plotting.style import RESULTANTS
+from ufl_beam.plotting.style import COLUMNS, COMPONENTS, RESULTANTS
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -68,16 +62,15 @@ Modules that define further results add their pictures; see ``structures/picture
 """
 
 IN_SPACE: dict[type, dict[str, Callable[..., Figure]]] = {
-    Scene: {"model": draw_model},
+    Scene: PICTURES[Scene],
     Solution: {
-        "shape": draw_shape_in_space,
-        **{name: partial(draw_shape_in_space, quantity=name) for name in DIAGRAMS},
-        "shapes": draw_shapes,
-        "history": draw_history,
-        "energy": draw_energy,
-        "dissipation": draw_dissipation,
+        **{
+            x: PICTURES[Solution][x]
+            for x in ("shape", "shapes", "history", "energy", "dissipation")
+        },
+        **{name: partial(draw_shape, quantity=name) for name in COLUMNS},
     },
-    Extremes: {name: partial(draw_extremes_in_space, quantity=name) for name in COMPONENTS},
+    Extremes: {name: partial(draw_extremes, quantity=name) for name in COMPONENTS},
 }
 """The same of scenes in space; other pictures are refused."""
 

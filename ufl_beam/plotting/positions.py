@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Positions of objects and labels in pictures, and plane geometry with arrays (..., 2)."""
+"""Positions of objects and labels in pictures, and geometry with arrays (..., 2 or 3)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import require_kind, require_number
@@ -26,6 +27,24 @@ proportion; points.  Smallest fraction to which they shrink."""
 
 FEW = 40  # number of supports and loads up to which their symbols shrink less than others
 
+FROM_A_SIDE = np.array([-0.55, 0.75, -0.4])
+"""View direction for scenes in space."""
+
+UP_IN_SPACE = np.array([0.0, 0.0, 1.0])
+"""Direction that is upwards in pictures of scenes in space."""
+
+
+def picture_axes(towards: Array, upwards: Array) -> Array:
+    """Return the directions to the right and upwards in a picture with a view direction; (2, 3)."""
+    right = np.cross(towards, upwards)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(right, towards) / np.linalg.norm(towards)])
+
+
+PICTURE = {2: np.eye(2), 3: picture_axes(FROM_A_SIDE, UP_IN_SPACE)}
+"""Directions to the right and upwards in pictures, by the number of coordinates; symbols are drawn
+along them."""
+
 Range = tuple[float, float]  # of positions along a rail, m, or of parameters of a guide curve
 
 
@@ -38,17 +57,18 @@ def directions(angles: Any) -> Array:
 
 
 def unit_vectors(vectors: Array) -> Array:
-    """Divide vectors by their lengths; (..., 2)."""
+    """Divide vectors by their lengths."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def normal(vectors: Array) -> Array:
-    """Rotate vectors to their left by a right angle; (..., 2)."""
-    return vectors[..., ::-1] * (-1.0, 1.0)
+    """Rotate vectors to their left by a right angle, in space within the picture."""
+    axes = PICTURE[vectors.shape[-1]]
+    return np.asarray((vectors @ axes.T)[..., ::-1] * (-1.0, 1.0) @ axes)
 
 
 def in_frame(points: Any, at: Any, ahead: Array) -> Array:
-    """Return points from coordinates about ``at``, along ``ahead`` and to its left; (n, 2)."""
+    """Return points from coordinates about ``at``, along ``ahead`` and to its left."""
     return np.asarray(at + np.array(points) @ np.array([ahead, normal(ahead)]))
 
 
@@ -58,7 +78,7 @@ def lengths_along(line: Array) -> Array:
 
 
 def points_along(line: Array, fractions: Any) -> Array:
-    """Return points of a line at fractions of its length; (n, 2)."""
+    """Return points of a line at fractions of its length; (n, 2 or 3)."""
     lengths = lengths_along(line)
     at = np.multiply(fractions, lengths[-1])
     return np.column_stack([np.interp(at, lengths, x) for x in line.T])
@@ -138,19 +158,20 @@ class Canvas:
         state = self.solution.subset(n, n + 1)
         moved = state.q[0, numbering.dofs[:, : numbering.displacements]]
         nodes = numbering.points + self.magnify * moved
-        return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
+        return DeformedShape(self, lambda place: state.displacement(place)[0], nodes, n)
 
     def points(self, origin: AttachmentPoint | None = None) -> Array:
-        """Return points of the undeformed and all shown shapes; (n, 2); m.
+        """Return points of the undeformed and all shown shapes; (n, 2 or 3); m.
 
-        The points are nodes of beams, attachment points on the ground, and outlines of bodies.  If
-        ``origin`` is given, they are relative to this place at the same time.
+        The points are nodes of beams, attachment points, and outlines of bodies.  If ``origin`` is
+        given, they are relative to this place at the same time.
         """
-        ground = np.reshape([point.point for point in self.spots[GROUND]], (-1, 2))
+        spots = [x for body in (GROUND, *self.scene.bodies) for x in self.spots[body]]
         shapes = []
         for shape in (self.undeformed, *map(self.shape, self.shown)):
             bodies = [shape.body_points(body, outline) for body, outline in self.outlines.items()]
-            points = np.concatenate([shape.nodes, ground, *bodies])
+            places = [shape.at(x)[None] for x in spots]
+            points = np.concatenate([shape.nodes, *places, *bodies])
             shapes.append(points if origin is None else points - shape.at(origin))
         return np.concatenate(shapes)
 
@@ -192,11 +213,17 @@ class Canvas:
 
     @cached_property
     def outlines(self) -> dict[Body, Array]:
-        """Closed convex outline of each body around its centre and attachment points; (n, 2); m."""
+        """Closed convex outline of each body around its centre and attachment points; (n, 2); m.
+
+        In space it is a circle in the picture around the centre; (n, 3).
+        """
         from scipy.spatial import ConvexHull
 
         outlines, circle = {}, self.unit * directions(np.arange(48) * math.pi / 24)
         for body in self.scene.bodies:
+            if self.scene.in_space:
+                outlines[body] = body.center + 0.6 * np.vstack([circle, circle[:1]]) @ PICTURE[3]
+                continue
             points = {body.center, *(x.point for x in self.spots[body])}
             radius = 0.75 if len(points) > 1 else 1.3
             cloud = np.concatenate([np.add(point, radius * circle) for point in points])
@@ -232,6 +259,7 @@ class DeformedShape:
     canvas: Canvas
     motion: Callable[[AttachmentPoint], Array]  # displacement of a place, not magnified; m, rad
     nodes: Array  # of all beams of a solution; (num_nodes, 2 or 3); m
+    index: int | None = None  # of the state; None for the undeformed scene
 
     def at(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place; (2,) or (3,); m."""
@@ -239,15 +267,28 @@ class DeformedShape:
         return np.asarray(place.point + self.canvas.magnify * moved)
 
     def rotation(self, place: AttachmentPoint) -> float:
-        """Return the rotation of a place; rad."""
-        return float(self.motion(place)[2])
+        """Return the rotation of a place in the plane, in space 0, as symbols face the viewer."""
+        return 0.0 if len(place.point) == 3 else float(self.motion(place)[2])
 
-    def turned(self, x: tuple[float, float], place: AttachmentPoint) -> Array:
-        """Rotate a vector with a place; (2,)."""
+    def turned(self, x: Any, place: AttachmentPoint) -> Array:
+        """Rotate a vector with a place; (2,) or (3,)."""
+        if len(place.point) == 3:
+            return np.asarray(Rotation.from_rotvec(self.motion(place)[3:]).apply(x))
         return in_frame(x, 0.0, directions(self.rotation(place)))
 
+    def section_axes(self, fractions: Array) -> Array:
+        """Return axes 1, 2, 3 of sections in space as columns; (num_cells, fractions, 3, 3)."""
+        assert self.canvas.solution is not None
+        _, axes = self.canvas.solution.cells.axes
+        if self.index is None:
+            return np.repeat(axes[:, None], len(fractions), axis=1)
+        cells = self.canvas.solution.cells_in_space(self.index)
+        return np.stack([cells.frames(s).as_matrix() @ axes for s in fractions], axis=1)
+
     def body_points(self, body: Body, points: Array) -> Array:
-        """Move points of an undeformed body with the body; (n, 2); m."""
+        """Move points of an undeformed body with the body, in space without turning them; m."""
+        if self.canvas.scene.in_space:
+            return np.asarray(points - body.center + self.at(body.middle))
         u, v, ψ = self.motion(body.middle)
         arms = points - body.center
         moved = in_frame(arms, (u, v), directions(ψ)) - arms

@@ -23,31 +23,23 @@ from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.films import WRITERS, Film, screen
 from ufl_beam.plotting.inelastic_pictures import open_hinges
 from ufl_beam.plotting.positions import (
+    FROM_A_SIDE,
+    UP_IN_SPACE,
     Canvas,
     DeformedShape,
     directions,
     evenly,
     in_frame,
     normal,
+    picture_axes,
     unit_vectors,
 )
-from ufl_beam.plotting.solids_in_space import (
-    FROM_A_SIDE,
-    PIN,
-    UP_IN_SPACE,
-    beams_in_space,
-    others_in_space,
-    points_in_space,
-    values_in_space,
-)
-from ufl_beam.plotting.solids_in_space import RESULTANTS as IN_SPACE
-from ufl_beam.plotting.style import RESULTANTS
+from ufl_beam.plotting.solids_in_space import PIN, beams_in_space, others_in_space
 from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin, disc
 from ufl_beam.simulation.solution import Solution
 
-QUANTITIES = {name: (f"{words} {name}", unit) for name, (words, unit) in RESULTANTS.items()}
-QUANTITIES["rotation"] = "rotation", "rad"
-QUANTITIES_IN_SPACE = {name: (f"{words} {name}", unit) for name, (words, unit) in IN_SPACE.items()}
+QUANTITIES = {**{name: style.resultant(name) for name in "NVM"}, "rotation": ("rotation", "rad")}
+QUANTITIES_IN_SPACE = {name: style.resultant(name) for name in "NVTM"}
 UP = np.array([0.0, 1.0, 0.0])  # upwards in the picture; the scene is in the plane of x and y
 FROM_THE_FRONT = (-0.20, -0.28, -1.0)  # view direction
 
@@ -117,9 +109,7 @@ class Camera(Record):
         if self.follow is not None:
             origin[: len(self.follow.point)] = shape.at(self.follow)
         towards, upwards = self.axes(shape.canvas.scene.in_space)
-        right = np.cross(towards, upwards)
-        right /= np.linalg.norm(right)
-        up = np.cross(right, towards)
+        right, up = picture_axes(towards, upwards)
         middle, aspect = box.mean(axis=0), size[1] / size[0]
         if self.width is None:
             corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
@@ -353,16 +343,10 @@ class Solids:
 
     def box(self) -> Array:
         """Return the lower and upper corner of the whole motion, beside the followed place; m."""
-        canvas, follow = self.canvas, self.camera.follow
-        if self.in_space:
-            shapes = [canvas.undeformed, *map(canvas.shape, canvas.shown)]
-            origins = [np.zeros(3) if follow is None else shape.at(follow) for shape in shapes]
-            pairs = zip(map(points_in_space, shapes), origins, strict=True)
-            points, half = np.concatenate([x - at for x, at in pairs]), 2.2 * canvas.unit
-            return np.array([points.min(axis=0) - half, points.max(axis=0) + half])
-        xy = canvas.points(follow)
-        margin, half = 2.2 * canvas.unit, self.thickest(self.solution.scene.beams)[1] / 2
-        return np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
+        points, margin = self.canvas.points(self.camera.follow), 2.2 * self.canvas.unit
+        half = [self.thickest(self.solution.scene.beams)[1] / 2] * (3 - points.shape[1])
+        low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+        return np.array([[*low, *np.negative(half)], [*high, *half]])
 
     @cached_property
     def canvas(self) -> Canvas:
@@ -386,13 +370,10 @@ class Solids:
     def values(self, n: int) -> Array:
         """Return the values that colours show at both ends of all cells; (num_cells, 2)."""
         solution, numbering = self.solution, self.solution.numbering
-        if self.in_space:
-            return values_in_space(solution, self.quantity, n)
         if self.quantity == "rotation":
             return np.asarray(solution.q[n][numbering.dofs[numbering.cells, 2]])
-        diagrams = (solution.diagram(beam, n, points=2) for beam in solution.scene.beams)
-        forces: list[Array] = [getattr(diagram, self.quantity) for diagram in diagrams]
-        return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
+        forces = style.components(solution.cell_forces(n, np.array([0.0, 1.0])), self.quantity)
+        return np.linalg.norm(forces, axis=2) if self.magnitudes else forces[:, :, 0]
 
     def beams(self, n: int, shape: DeformedShape, factor: float) -> Any:
         """Make a hexahedron for each cell of the beams, with values that colours show.
@@ -402,7 +383,7 @@ class Solids:
         from pyvista import CellType, UnstructuredGrid
 
         if self.in_space:
-            mesh = beams_in_space(self.solution, n, shape, self.thickness)
+            mesh = beams_in_space(self.solution, shape, self.thickness)
             mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
             return mesh
         numbering = self.solution.numbering

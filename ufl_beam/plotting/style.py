@@ -33,6 +33,12 @@ COLORS = (BLUE, RED, GREEN, PINK, ORANGE, SKY)  # of lines in one picture
 INK, TEXT, GREY, WHITE = "#222222", "#444444", "#B5B5B5", "#FFFFFF"
 
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
+COLUMNS = {"N": [0], "V": [1, 2], "T": [3], "M": [4, 5]}
+COLUMNS |= {"V2": [1], "V3": [2], "M2": [4], "M3": [5]}
+"""Columns of section forces in space; V and M are vectors across the beam."""
+
+COMPONENTS = "M3", "M2", "T", "N", "V2", "V3"
+"""Section forces in space whose envelopes are drawn."""
 
 POINTS = 72.0  # points per inch
 CSS_DPI = 80.0  # pixels on an HTML page per inch of a figure
@@ -75,6 +81,18 @@ def number(value: float) -> str:
 def magnified(factor: float, before: str = ", ") -> str:
     """Return words on the factor on displacements, or an empty text if it is 1."""
     return f"{before}displacements × {factor:g}" if factor != 1 else ""
+
+
+def resultant(name: str) -> tuple[str, str]:
+    """Return words with the name of a section force, such as "bending moment M2", and its unit."""
+    words, unit = (RESULTANTS | {"T": ("torsional moment", "N m")})[name[0]]
+    return f"{words} {name}", unit
+
+
+def components(forces: Array, name: str) -> Array:
+    """Return components of a section force from (..., 3), or in space (..., 6); (..., 1 or 2)."""
+    in_plane = forces.shape[-1] == len(RESULTANTS)
+    return forces[..., [[*RESULTANTS].index(name)] if in_plane else COLUMNS[name]]
 
 
 def require_option(option: str, options: Iterable[str], what: str) -> None:
@@ -251,9 +269,9 @@ def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
     return ScalarMappable(Normalize(low, high), colors)
 
 
-def draw_bar(axes: Axes, colors: Any, label: str) -> Any:
+def draw_bar(axes: Axes, colors: Any, label: str, pad: float = 0.02) -> Any:
     """Draw the colour bar of a :func:`scale`, and return it."""
-    bar = axes.figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=0.02)
+    bar = axes.figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=pad)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)
     return bar

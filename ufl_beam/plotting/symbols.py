@@ -23,7 +23,14 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
 from ufl_beam.plotting import positions
-from ufl_beam.plotting.positions import DeformedShape, directions, in_frame, normal, unit_vectors
+from ufl_beam.plotting.positions import (
+    PICTURE,
+    DeformedShape,
+    directions,
+    in_frame,
+    normal,
+    unit_vectors,
+)
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
 
 if TYPE_CHECKING:
@@ -42,7 +49,7 @@ MOST_BODIES = 300  # number of bodies beyond which bodies are drawn as dots
 class Stroke(NamedTuple):
     """Line, or an area if it is filled."""
 
-    points: Array  # (n, 2); m, or units in the tables of symbols
+    points: Array  # (n, 2 or 3); m, or units in the tables of symbols
     color: str = INK
     weight: float = 1.6  # width of the line; points
     fill: str | None = None  # colour of the area
@@ -55,6 +62,7 @@ def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any 
     Strokes that look alike share a collection, so that large scenes are drawn fast.
     """
     from matplotlib.collections import LineCollection, PolyCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     alike: defaultdict[tuple[str, str, float, str | None, float], list[Array]] = defaultdict(list)
     for group, strokes in groups.items():
@@ -63,6 +71,13 @@ def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any 
     for (group, own, weight, fill, layer), lines in alike.items():
         edge = shade(own) if color is None else color
         inside = "none" if fill is None else shade(fill) if color is None else (color, 0.15)
+        if lines[0].shape[1] == 3:
+            look: dict[str, Any] = {"linewidth": weight, "zorder": layer, "gid": group}
+            axes.plot(*positions.joined(lines).T, color=edge, **look)  # also updates the limits
+            if fill is not None:
+                area: Any = Poly3DCollection(lines, edgecolors=edge, facecolors=inside, **look)
+                axes.add_collection(area)
+            continue
         kind = LineCollection if fill is None else PolyCollection
         collection = kind(
             lines, edgecolors=edge, facecolors=inside, linewidths=weight, zorder=layer,
@@ -84,7 +99,7 @@ def _box(low: float, high: float, half: float, fill: str) -> Stroke:
 def disc(at: Array, radius: float, color: str, fill: str, layer: float = PINS) -> Stroke:
     """Draw a filled circle; its centre and radius are in m."""
     circle = directions(np.linspace(0.0, 2 * math.pi, 25))
-    return Stroke(at + radius * circle, color, 1.4, fill, layer)
+    return Stroke(at + radius * circle @ PICTURE[len(at)], color, 1.4, fill, layer)
 
 
 # -- supports ----------------------------------------------------------------------------------
@@ -105,8 +120,8 @@ The supported place is the origin, and the beam is above."""
 class SupportSymbol(NamedTuple):
     """Symbol of a support, or of a point of the ground."""
 
-    at: Array  # (2,); m
-    angle: float  # rotation of the symbol; rad
+    at: Array  # (2,) or (3,); m
+    angle: float  # rotation of the symbol in the picture; rad
     outlines: tuple[Outline, ...]
     color: str  # orange if the support moves
     place: AttachmentPoint
@@ -120,7 +135,7 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
     for support in scene.supports:
         place, held = support.place, support.held
         color = ORANGE if support.moving else GROUND_GREY
-        if len(held) == 3:
+        if support.bears_moment if scene.in_space else len(held) == 3:
             symbols.append((place, color, 3, _inward(place) + shape.rotation(place), 0.0))
         else:
             angle = support.angle - (0.0 if 1 in held else math.pi / 2)
@@ -136,11 +151,10 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         for point in places:
             if isinstance(point, BodyPoint) and point.body is GROUND:
                 far = next(place for place in places if place != point)
-                (x, y), (X, Y) = point.point, far.point
-                if (x, y) == (X, Y) and isinstance(far, BodyPoint):
-                    X, Y = far.body.center
-                away = (x, y) != (X, Y)
-                inward = math.atan2(Y - y, X - x) if away else _inward(far)
+                end = far.point
+                if end == point.point and isinstance(far, BodyPoint):
+                    end = far.body.center
+                inward = _angle(point.point, end) if end != point.point else _inward(far)
                 known, before = grounds.get(point, (inward, rotates is not None))
                 grounds[point] = known, before and rotates is not False
     for point, (inward, rotates) in grounds.items():
@@ -157,7 +171,7 @@ def supports(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw supports; supports that do not move are on hatched ground."""
     unit = shape.canvas.outside
     for at, angle, outlines, color, _ in support_symbols(shape):
-        ahead = unit * directions(angle)
+        ahead = unit * directions(angle) @ PICTURE[len(at)]
         yield from (Stroke(in_frame(x, at, ahead), color, 0.5, color, 3.5) for x in outlines)
         if color != ORANGE:
             low = min(y for outline in outlines for _, y in outline)
@@ -168,8 +182,13 @@ def _inward(place: AttachmentPoint) -> float:
     """Return the angle of the inward direction at a beam's end; at other places π/2; rad."""
     if not isinstance(place, Place) or 0.0 < place.s < 1.0:
         return math.pi / 2
-    (x, y), (X, Y) = place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3)
-    return math.atan2(Y - y, X - x)
+    return _angle(place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3))
+
+
+def _angle(start: Any, end: Any) -> float:
+    """Return the angle of a line in the picture; rad."""
+    x, y = PICTURE[len(start)] @ np.subtract(end, start)
+    return math.atan2(y, x)
 
 
 def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
@@ -187,11 +206,16 @@ def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
 
 
 def bodies(shape: DeformedShape) -> list[Stroke]:
-    """Draw outlines of the rigid bodies."""
-    return [
+    """Draw outlines of the rigid bodies, in space circles with lines to attachment points."""
+    found = [
         Stroke(shape.body_points(body, outline), EDGE, 1.6, FILLED, BEHIND)
         for body, outline in shape.canvas.outlines.items()
     ]
+    if shape.canvas.scene.in_space:
+        pairs = ((body, x) for body in shape.canvas.outlines for x in shape.canvas.spots[body])
+        ends = (np.array([shape.at(body.middle), shape.at(x)]) for body, x in pairs)
+        found += [Stroke(line, EDGE, 3.0, layer=BEHIND) for line in ends]
+    return found
 
 
 def centres(shape: DeformedShape) -> Iterator[Stroke]:
@@ -287,16 +311,30 @@ def rods(shape: DeformedShape) -> Iterator[Stroke]:
 
 
 def rails(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw rails with their blocks, guide curves, and the bars of releases."""
+    """Draw rails with their blocks, guide curves, and the bars of releases; in space axes."""
     for joint in shape.canvas.scene.joints:
-        if draw := joint_symbol(joint).rail:
+        if shape.canvas.scene.in_space:
+            yield from _axes_of_joint(shape, joint)
+        elif draw := joint_symbol(joint).rail:
             yield from draw(shape, joint)
+
+
+def _axes_of_joint(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
+    """Draw the axes of a joint in space, and the block of a slider."""
+    axis, at = getattr(joint, "axis", None), shape.at(joint.places[-1])
+    own = getattr(joint, "axes", [axis] * (axis is not None))
+    for place, x in zip(joint.places, own, strict=False):
+        line = 1.5 * shape.canvas.unit * np.outer((-1.0, 1.0), shape.turned(x, place))
+        yield Stroke(at + line, DARK, 4.0, layer=UPON)
+    if not joint.meets and axis is not None:
+        ahead = shape.canvas.unit * PICTURE[3][0]
+        yield Stroke(in_frame(_box(-0.5, 0.5, 0.5, WHITE).points, at, ahead), INK, 1.8, WHITE)
 
 
 class Pin(NamedTuple):
     """Pin of a joint."""
 
-    at: Array  # (2,); m
+    at: Array  # (2,) or (3,); m
     rotates: bool  # True if the joint turns freely
     places: tuple[AttachmentPoint, ...]  # places that it joins at this point
 
@@ -432,7 +470,7 @@ def connectors(shape: DeformedShape) -> Iterator[Stroke]:
 
 
 def connector_ends(shape: DeformedShape, connector: Connector) -> tuple[Array, Array]:
-    """Return the start and end of the drawing of a straight connector; (2,) each; m.
+    """Return the start and end of the drawing of a straight connector; (2,) or (3,) each; m.
 
     A sliding connector is drawn along its axis and ends at the projection of its place b onto the
     axis.  It begins before a if it would otherwise be too short in the undeformed scene.
@@ -486,7 +524,7 @@ def _around(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
         at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
         s, t = (np.interp(at, np.arange(len(stroke.points)), x) for x in stroke.points.T)
         r = np.maximum(radius * (1.0 + t / 3.0), 0.18 * radius)
-        direction = directions(first - 0.5 + sweep * (s + 2.0) / 4.0)
+        direction = directions(first - 0.5 + sweep * (s + 2.0) / 4.0) @ PICTURE[len(pin)]
         layer = FRONT + stroke.layer - MIDDLE
         yield stroke._replace(points=pin + r[:, None] * direction, layer=layer)
     start = shape.at(connector.a)
@@ -497,11 +535,12 @@ def _around(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
 # -- all symbols -------------------------------------------------------------------------------
 
 
-def in_plane(shape: DeformedShape) -> dict[str, list[Stroke]]:
-    """Draw all symbols in the plane, by groups; bodies are dots if there are many."""
+def all_symbols(shape: DeformedShape) -> dict[str, list[Stroke]]:
+    """Draw all symbols, by groups; bodies are dots if there are many."""
     scene, unit = shape.canvas.scene, shape.canvas.unit
     few = len(scene.bodies) <= MOST_BODIES
     square = 0.27 * unit * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
+    square = square @ PICTURE[3 if scene.in_space else 2]
     return {
         "bodies": bodies(shape)
         if few
@@ -509,7 +548,7 @@ def in_plane(shape: DeformedShape) -> dict[str, list[Stroke]]:
         "joints": [*rods(shape), *rails(shape)],
         "connectors": [*connectors(shape)],
         "supports": [*supports(shape)],
-        "centres": [*centres(shape)] if few else [],
+        "centres": [*centres(shape)] if few and not scene.in_space else [],
         "pins": [
             disc(at, unit / 3, INK, WHITE) if rotates else Stroke(at + square, INK, 1.0, INK, PINS)
             for at, rotates, _ in pins(shape)

@@ -69,8 +69,8 @@ def checked_numbering(
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if scene.in_space:
-        free_motion = "" if has_inertia(scheme) else require_no_mechanism(scene)
-    elif has_inertia(scheme):
+        require_for_space(scheme)
+    if has_inertia(scheme):
         require_inertia(scene)
         warn_of_masses(scene)
         if scene.initial:
@@ -84,14 +84,10 @@ def checked_numbering(
         if fresh and scheme.theta < 1:  # the run would oscillate about equilibrium
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
-    if scene.in_space:
-        require_for_space(scheme)
-        if len(stages_of(scheme)) > 1:
-            require_smooth(scene, scheme)
-        warn_of_warping(scene)
-        return DofNumbering(scene, mesh), free_motion
     require_works(scene, mesh.degree, scheme)
-    require_independent(scene)
+    if not scene.in_space:
+        require_independent(scene)
+    warn_of_warping(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)
     numbering = DofNumbering(scene, mesh)

@@ -18,7 +18,6 @@ from ufl_beam.plotting.frame_pictures import draw_envelope
 from ufl_beam.plotting.history_pictures import bounds
 from ufl_beam.plotting.labels import Label, around, write_labels
 from ufl_beam.plotting.plot import IN_SPACE, PICTURES
-from ufl_beam.plotting.space_pictures import COMPONENTS, draw_envelope_in_space
 from ufl_beam.plotting.style import BLUE, COLORS, GREY, INK, ORANGE, RED, picture, shade, with_unit
 from ufl_beam.structures.calibration_result import Calibration
 from ufl_beam.structures.fatigue import Fatigue, HotSpot
@@ -102,11 +101,11 @@ def draw_response(
 ) -> Figure:
     """Draw a section force of a :class:`SpectralResponse` on the frame, with both signs."""
     diagrams = [
-        (beam, sign * getattr(response.diagram(beam), quantity))
+        (beam, sign * getattr(response.diagram(beam), quantity)[:, None])
         for beam in response.scene.beams
         for sign in (1.0, -1.0)
     ]
-    title = f"{style.RESULTANTS[quantity][0]} {quantity}", "by response spectrum"
+    title = style.resultant(quantity)[0], "by response spectrum"
     return draw_envelope(response.modes.motion(0), title, quantity, diagrams, ax)
 
 
@@ -115,11 +114,7 @@ def draw_combinations(
 ) -> Figure:
     """Draw the envelope of a section force over load combinations on the undeformed frame."""
     solution, number = next(iter(combined.solutions.values())), len(combined.solutions)
-    if solution.scene.in_space:
-        return draw_envelope_in_space(
-            solution, combined, f"extremes of {number} load combinations", quantity, ax
-        )
-    words = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}"
+    words = f"extremes of the {style.resultant(quantity)[0]}"
     title = words, f"of {number} load combinations"
     return draw_envelope(solution, title, quantity, bounds(solution, combined, quantity), ax)
 
@@ -336,7 +331,7 @@ def _of_forces(draw: Any, names: Sequence[str] = ("M", "N", "V")) -> dict[str, A
     return {name: partial(draw, quantity=name) for name in names}
 
 
-IN_SPACE[LoadCombinations] = _of_forces(draw_combinations, COMPONENTS)
+IN_SPACE[LoadCombinations] = _of_forces(draw_combinations, style.COMPONENTS)
 PICTURES.update({
     Calibration: {"fit": draw_calibration},
     Storeys: _of_forces(draw_storeys, ("drift", "shear")),

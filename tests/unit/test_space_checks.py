@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: MIT
+"""Checks and warnings of scenes in space that are those of the plane, and pictures of models."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+TUBE = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
+LIGHT = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3)
+
+
+def beam(start=(0, 0, 0), end=(1, 0, 0), section=TUBE, **more):
+    return ub.Beam(start, end, section, cells=2, **more)
+
+
+ARM = beam(name="arm")
+FOOT = ub.Clamped(ARM.start)
+
+
+def run(scene, scheme=None):
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, progress=False)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ub.Rigid(ub.ground(0, 0), ARM.start),
+        lambda: ub.Spherical(ARM.end, ub.ground(1, 0, 0), ub.ground(1, 0)),
+        lambda: ub.Revolute(ub.ground(0, 0), ARM.start, axis=(0, 0, 1)),
+        lambda: ub.Universal(ARM.end, ub.ground(1, 0), axes=((0, 1, 0), (0, 0, 1))),
+        lambda: ub.Link(ARM.end, ub.ground(1, 1)),
+        lambda: ub.Prismatic(ub.ground(1, 1), ARM.end),
+        lambda: ub.Stretch(ub.ground(1, 1), ARM.end, ub.Spring(1.0)),
+    ],
+)
+def test_places_of_one_connection_have_equal_numbers_of_coordinates(make):
+    with pytest.raises(ub.ModelError, match="two coordinates, and others three"):
+        make()
+
+
+def test_bodies_have_as_many_coordinates_as_beams():
+    with pytest.raises(ub.ModelError, match="plate: its points have two coordinates"):
+        ub.Scene([ARM], bodies=[ub.Body((1, 0), mass=1.0, name="plate")], supports=[FOOT])
+
+
+def test_beams_without_mass():
+    load = ub.PointLoad(ARM.end, force=(0, 0, -1.0))
+    light = beam((1, 0, 0), (2, 0, 0), LIGHT, name="light")
+    joint = ub.Rigid(ARM.end, light.start)
+    with pytest.warns(ub.ModelWarning, match="light: without mass"):
+        run(ub.Scene([ARM, light], joints=[joint], supports=[FOOT], loads=[load]))
+    alone = beam(section=ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=0.0))
+    held = ub.Spherical(ub.ground(0, 0, 0), alone.start)
+    with pytest.raises(ub.ModelError, match="dynamics needs mass or resistance"):
+        run(ub.Scene([alone], joints=[held]))
+    run(ub.Scene([alone], supports=[ub.Clamped(alone.start)]))
+
+
+def test_ends_that_touch():
+    loose = beam((1, 0, 0), (1, 1, 0), name="loose")
+    scene = ub.Scene([ARM, loose], supports=[FOOT])
+    with pytest.warns(ub.ModelWarning, match="arm.end .* and loose.start .* touch"):
+        run(scene)
+    for joint in (
+        ub.Spherical(ARM.end, loose.start),
+        ub.Revolute(ARM.end, loose.start, axis=(0, 0, 1), multipliers=True),
+    ):
+        run(ub.Scene([ARM, loose], joints=[joint], supports=[FOOT]))
+
+
+def test_points_far_from_their_body_and_velocities_about_a_far_origin():
+    box = ub.Body((10, 0, 0), mass=1.0, inertia=(0.1, 0.1, 0.1), name="box")
+    rope = ub.Link(ARM.end, box.at(0.1, 0, 5))
+    with pytest.warns(ub.ModelWarning, match=r"body.at\(x, y, z\) .* at\(10 \+ 0.1, 0 \+ 0, "):
+        run(ub.Scene([ARM], bodies=[box], joints=[rope], supports=[FOOT]))
+    far = beam((10, 0, 0), (11, 0, 0), name="far")
+    spin = ub.Velocity([far], angular=(0, 0, 3.0))
+    with pytest.warns(ub.ModelWarning, match=r"angular = 0, 0, 3 rad/s without about=.*10 m away"):
+        run(ub.Scene([far], initial=[spin]))
+
+
+def test_model_shows_all_loads_and_connectors():
+    box = ub.Body((2, 0, 1), mass=20.0, inertia=(1.0, 2.0, 3.0), name="box")
+    mast = beam((0, 0, 0), (0, 0, 1), up=(1, 0, 0), name="mast")
+    arm = beam((0, 0, 1), (2, 0, 1), name="arm", hinges={0.5: ub.Softening(1e4, 1e3)})
+    scene = ub.Scene(
+        [mast, arm], bodies=[box],
+        joints=[
+            ub.Rigid(mast.end, arm.start),
+            ub.Universal(arm.end, box.middle, axes=((0, 1, 0), (0, 0, 1))),
+        ],
+        supports=[
+            ub.PrescribedDisplacement(
+                mast.start, u=0.0, v=0.0, w=lambda t: 0.1 * t, axis=(0, 0, 1), psi=lambda t: t
+            )
+        ],
+        connectors=[ub.Stretch(ub.ground(2, 1, 0), box.middle, ub.Spring(1e3))],
+        loads=[
+            ub.Gravity((0, 0, -9.81)), ub.Pressure(mast, normal=(30.0, 40.0)),
+            ub.FollowerLoad(arm.at(0.25), force=(0, 7.0, 0), moment=(0, 0, 11.0)),
+            ub.MovingLoad(arm, force=(0, 0, -13.0), position=lambda t: t),
+            ub.RotatingFrame(rate=(0, 0, 1.0), about=(0, 0, 0)),
+        ],
+        initial=[ub.Velocity([box], linear=(3.0, 4.0, 0), angular=(0, 0, 2.0), about=(2, 0, 1))],
+        damping=[ub.KelvinVoigt(1e-3)],
+    )  # fmt: skip
+    figure = ub.plot(scene)
+    figure.draw_without_rendering()
+    words = [x.get_text() for x in figure.axes[0].texts]
+    for text in (
+        "g = 9.81 m/s²", "50 N/m, follows", "7 N, follows", "11 N m, follows", "13 N, moves",
+        "frame: (0, 0, 1) rad/s about (0, 0, 0)", "1 kN/m", "box, 20 kg", "hinge 10 kN m", "w(t)",
+        "ψ(t)", "5 m/s (2 rad/s)", "Kelvin–Voigt damping, 1 ms", "mast",
+    ):  # fmt: skip
+        assert text in words, (text, words)
+
+
+def test_symbols_lie_in_the_picture():
+    """A normal is perpendicular to the view direction, and to its vector as it is seen."""
+    from ufl_beam.plotting.positions import FROM_A_SIDE, PICTURE, normal
+
+    vectors = np.random.default_rng(0).normal(size=(5, 3))
+    left = normal(vectors)
+    assert np.allclose(left @ FROM_A_SIDE, 0.0, atol=1e-14)
+    seen, turned = vectors @ PICTURE[3].T, left @ PICTURE[3].T
+    assert np.allclose(turned, seen[:, ::-1] * (-1.0, 1.0), atol=1e-14)
+    assert math.isclose(PICTURE[3][1, 2], np.abs(PICTURE[3][:, 2]).max())  # z is upwards
