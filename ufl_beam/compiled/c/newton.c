@@ -214,7 +214,7 @@ static int test_convergence(equation *e, const double *x, int iteration)
     if ((stays || residual <= floor / 80) && laws_met(e, x, scale)) return AT_ROUND_OFF;
     /* With a kept tangent, the residual falls by twice the last factor. It must fall far enough
      * that works are the same as with a new tangent. */
-    e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
+    e->near = !kept && !e->rotations && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
   }
   /* A tangent with the row of a motion does not fit the row of a force: newtons of the residual
    * would become metres of the change. */
@@ -311,6 +311,98 @@ static double work_of_residual(const equation *e)
   return over_processes(e, TOTAL, sum);
 }
 
+/* Added to the first component of a conformal rotation vector, of length 4 at most, if the node has turned by between
+ * 180 and 540 degrees: then its quaternion has the other sign. See Turn in spatial_kinematics.py. */
+static const double FLIPPED = 32;
+
+/* The vector p of a rotation by 4 atan(|p|), which is the rotation of a conformal rotation vector m, with its sign as p[0]. */
+static void take_turn(const double *m, double *p)
+{
+  const double flips = fabs(m[0]) > FLIPPED / 2 ? copysign(FLIPPED, m[0]) : 0;
+  p[0] = flips ? -1 : 1, p[1] = (m[0] - flips) / 4, p[2] = m[1] / 4, p[3] = m[2] / 4;
+}
+
+/* Rotation vectors of the step to x, which are at most half turns. */
+static void find_turning(const equation *e, const double *x)
+{
+  if (e->rotations) x = in_plane(e, x);
+  for (int k = 0; k < e->rotations; k += 3) {
+    const int32_t *i = e->rotation + k;
+    const double m[] = {x[i[0]] - e->base[i[0]], x[i[1]] - e->base[i[1]], x[i[2]] - e->base[i[2]]};
+    double p[4];
+    take_turn(m, p);
+    const double size = hypot(hypot(p[1], p[2]), p[3]), f = size > 0 ? 4 * atan(size) / size : 4;
+    for (int j = 0; j < 3; ++j) e->turning[i[j]] = f * p[1 + j];
+  }
+}
+
+/* Product of quaternions. */
+static void multiply_turns(const double *q, const double *p, double *out)
+{
+  out[0] = q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
+  for (int j = 0; j < 3; ++j) {
+    const int a = 1 + (j + 1) % 3, b = 1 + (j + 2) % 3;
+    out[1 + j] = q[0] * p[1 + j] + p[0] * q[1 + j] + q[a] * p[b] - q[b] * p[a];
+  }
+}
+
+/* Let a node turn from the rotations m by the rotation vector to which their change d is tangent. Returns the conformal
+ * rotation vector in m, and in `turning` the rotation vector of the step, with whole turns. */
+static void turn_node(const double *d, const double *turned, double *m, double *turning)
+{
+  double p[4], way[4] = {0, d[0], d[1], d[2]}, back[4], spin[4], end[4], axis[3], expected[3], whole = 0, far = 0;
+  take_turn(m, p);
+  const double old = p[0], c = 1 / (1 + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
+  p[0] = 1;
+  /* spin = p d p* c², with the conjugate p*; the turn before is p p c. */
+  const double conjugate[] = {1, -p[1], -p[2], -p[3]};
+  multiply_turns(p, way, back), multiply_turns(back, conjugate, spin);
+  for (int j = 0; j < 3; ++j) spin[1 + j] *= c * c, expected[j] = turned[j] + spin[1 + j], far = hypot(far, expected[j]);
+  const double angle = hypot(hypot(spin[1], spin[2]), spin[3]), f = angle > 0 ? sin(angle / 2) / angle : 0.5;
+  way[0] = cos(angle / 2);
+  for (int j = 1; j < 4; ++j) way[j] = f * spin[j];
+  multiply_turns(p, p, back), multiply_turns(way, back, end);
+  const double sign = end[0] < 0 ? -1 : 1, sine = c * hypot(hypot(end[1], end[2]), end[3]);
+  const double wide = sine > 0 ? 2 * atan2(sine, fabs(c * end[0])) / sine : 2, flip = old * sign < 0 ? FLIPPED : 0;
+  for (int j = 0; j < 4; ++j) end[j] *= sign * c;
+  for (int j = 0; j < 3; ++j) {
+    axis[j] = sine > 1e-8 ? end[1 + j] / sine : far > 0 ? expected[j] / far : 0;
+    whole += axis[j] * (expected[j] - wide * end[1 + j]);
+  }
+  whole = 2 * M_PI * round(whole / (2 * M_PI));
+  for (int j = 0; j < 3; ++j) m[j] = 4 * end[1 + j] / (1 + end[0]), turning[j] = wide * end[1 + j] + whole * axis[j];
+  m[0] += flip;
+}
+
+/* Set the iterate x to a fraction of the change from `from`. Rotations in static steps in space are composed: so a beam
+ * that rolls up turns as far as the linear equation says. */
+static void move_to(equation *e, double *x, const double *from, double way)
+{
+  double *to = e->to;
+  if (!e->rotations || e->border) {
+    for (int i = 0; i < e->owned; ++i) x[i] = from[i] - way * e->change[i];
+    return;
+  }
+  memcpy(e->space, from, e->size * sizeof *x);
+  const double *begin = in_plane(e, e->space);
+  for (int i = 0; i < e->size; ++i) to[i] = e->space[i] - way * e->change[i];
+  turn_axes(e->turned, e->axes, to, -1);
+  memcpy(x, to, e->size * sizeof *x);
+  for (int k = 0; k < e->rotations; k += 3) {
+    double d[3], m[3], turned[3], turning[3];
+    for (int j = 0; j < 3; ++j) {
+      const int i = e->rotation[k + j];
+      d[j] = to[i] - begin[i], m[j] = begin[i] - e->base[i], turned[j] = e->turned_by[i];
+    }
+    if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+    turn_node(d, turned, m, turning);
+    for (int j = 0; j < 3; ++j) x[e->rotation[k + j]] = e->base[e->rotation[k + j]] + m[j], e->turning[e->rotation[k + j]] = turning[j];
+  }
+  turn_axes(e->turned, e->axes, x, 1);
+  for (int k = 0; k < e->held; ++k) x[e->hold[k]] = e->space[e->hold[k]];
+  for (int k = 0; k < e->predictions; ++k) e->predicted[k]->to = to;
+}
+
 /* Line search by secants: take the fraction of the full change at which the residual does no work
  * on it.
  *
@@ -328,7 +420,7 @@ static int search(equation *e, double *x)
   double before = work_of_residual(e), last = 0, way = 1;
   const double first = fabs(before);
   for (int k = 1;; ++k) {
-    for (int i = 0; i < e->owned; ++i) x[i] = e->start[i] - way * e->change[i];
+    move_to(e, x, e->start, way);
     TRY(residual_at(e, x));
     const double now = work_of_residual(e), slope = (now - before) / (way - last);
     if (k == EVALUATIONS || !(fabs(now) > PART * first) || slope == 0) return 0;
@@ -359,9 +451,10 @@ static int newton(equation *e, double *x)
       e->reason = SINGULAR;
       return 0;
     }
+    if (e->rotations) memcpy(e->turned_by, e->turning, e->size * sizeof *x);
     if (e->careful) TRY(search(e, x));
     else {
-      for (int i = 0; i < e->owned; ++i) x[i] -= e->change[i];
+      move_to(e, x, x, 1);
       TRY(residual_at(e, x));
     }
     ++e->iterations;
@@ -439,7 +532,7 @@ void restart(const equation *e, enum tangents kind)
 {
   for (int k = 0; k < e->predictions; ++k) {
     predicted_forces *p = e->predicted[k];
-    p->begins = kind != EXACT, p->stale = 1, p->exact = kind != PREDICTED;
+    p->begins = kind != EXACT, p->stale = 1, p->exact = kind != PREDICTED, p->to = 0;
   }
 }
 
@@ -450,6 +543,7 @@ static int go_to(equation *e, const double *guess, enum tangents kind)
   TRY(petsc.VecGetArray(e->x, &q)); /* tells PETSc of the change */
   if (guess != e->unknowns) memcpy(e->unknowns, guess, e->size * sizeof *guess);
   TRY(petsc.VecRestoreArray(e->x, &q));
+  find_turning(e, e->unknowns);
   restart(e, kind);
   return 0;
 }
@@ -525,7 +619,7 @@ static int find_equilibrium(equation *e, const double *guess)
 {
   e->error = 0;
   if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST);
-  int reason = iterate_from(e, guess, SHORT_PATIENCE, PREDICTED);
+  int reason = iterate_from(e, guess, e->rotations ? LONG_PATIENCE : SHORT_PATIENCE, PREDICTED);
   if (reason == STALLED) {
     restart(e, EXACT);
     reason = iterate(e, LONG_PATIENCE, 1);
