@@ -93,7 +93,7 @@ class CellInSpace(InertiaInSpace):
 
     @property
     def modes(self) -> Sequence[str]:
-        """In statics as of :class:`~ufl_beam.blocks.beams.BeamCell`, and motions that are predicted."""
+        """In statics as of :class:`~ufl_beam.blocks.beams.BeamCell`, and predicted motions."""
         about, to = ([f"{x} {y}" for y in self.unknowns] for x in ("about", "to"))
         return [] if has_inertia(self.scheme) else [*about, "moved", "reached", *to]
 

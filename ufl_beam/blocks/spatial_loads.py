@@ -23,8 +23,8 @@ from ufl_beam.blocks.nodes_in_space import (
     unknowns,
     vector,
 )
-from ufl_beam.compiled.c_library import fill
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.compiled.c_library import fill
 from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.spatial_kinematics import (

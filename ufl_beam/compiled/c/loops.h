@@ -661,7 +661,7 @@ struct element_block {
   const cells *inserted;    /* cells whose tangent is inserted as that of a form; or none */
   predicted_forces *predicted; /* of cells in static steps; further modes are then motions at the latest tangent, and
                              * two numbers, see set_prediction */
-  int turns;                /* of loads: whether a node turns in a step that ends in another unit of moments */
+  int turns;                /* of loads: whether moments are in axes of nodes before the step, at the end of which they act */
 };
 
 /* A block, and the same in a neighbouring scene, whose state follows from the configuration. */

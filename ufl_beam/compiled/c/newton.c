@@ -223,7 +223,8 @@ static int test_convergence(equation *e, const double *x, int iteration)
   /* Directly after the activation of a connector, balanced forces are no measure of convergence, as
    * its law is not met yet. */
   const double size = iteration > 0 || met ? residual : scale;
-  if (size <= e->best / 2) e->best = size, e->slow = 0;
+  /* Full steps of rotations in space leave the guess far: later residuals fall from that of the first iterate. */
+  if (size <= e->best / 2 || (iteration == 1 && e->rotations && !e->careful)) e->best = size, e->slow = 0;
   e->last = residual;
   return e->slow == e->patience ? STALLED : ITERATING;
 }
@@ -315,14 +316,18 @@ static double work_of_residual(const equation *e)
  * 180 and 540 degrees: then its quaternion has the other sign. See Turn in spatial_kinematics.py. */
 static const double FLIPPED = 32;
 
-/* The vector p of a rotation by 4 atan(|p|), which is the rotation of a conformal rotation vector m, with its sign as p[0]. */
-static void take_turn(const double *m, double *p)
+/* The quaternion (1, p), without its length, of which the square is the rotation of a conformal rotation vector m; returns
+ * the sign of that. */
+static int take_half(const double *m, double *p)
 {
   const double flips = fabs(m[0]) > FLIPPED / 2 ? copysign(FLIPPED, m[0]) : 0;
-  p[0] = flips ? -1 : 1, p[1] = (m[0] - flips) / 4, p[2] = m[1] / 4, p[3] = m[2] / 4;
+  p[0] = 1, p[1] = (m[0] - flips) / 4, p[2] = m[1] / 4, p[3] = m[2] / 4;
+  return flips ? -1 : 1;
 }
 
-/* Rotation vectors of the step to x, which are at most half turns. */
+static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+/* Rotation vectors of the step to x, of less than a turn. */
 static void find_turning(const equation *e, const double *x)
 {
   if (e->rotations) x = in_plane(e, x);
@@ -330,9 +335,8 @@ static void find_turning(const equation *e, const double *x)
     const int32_t *i = e->rotation + k;
     const double m[] = {x[i[0]] - e->base[i[0]], x[i[1]] - e->base[i[1]], x[i[2]] - e->base[i[2]]};
     double p[4];
-    take_turn(m, p);
-    const double size = hypot(hypot(p[1], p[2]), p[3]), f = size > 0 ? 4 * atan(size) / size : 4;
-    for (int j = 0; j < 3; ++j) e->turning[i[j]] = f * p[1 + j];
+    const double whole = take_half(m, p) < 0 ? 2 * M_PI : 0, size = length(p + 1);
+    for (int j = 0; j < 3; ++j) e->turning[i[j]] = size > 0 ? (4 * atan(size) - whole) / size * p[1 + j] : m[j];
   }
 }
 
@@ -340,38 +344,36 @@ static void find_turning(const equation *e, const double *x)
 static void multiply_turns(const double *q, const double *p, double *out)
 {
   out[0] = q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
-  for (int j = 0; j < 3; ++j) {
-    const int a = 1 + (j + 1) % 3, b = 1 + (j + 2) % 3;
-    out[1 + j] = q[0] * p[1 + j] + p[0] * q[1 + j] + q[a] * p[b] - q[b] * p[a];
-  }
+  for (int j = 1, a = 2, b = 3; j < 4; ++j, a = a % 3 + 1, b = b % 3 + 1)
+    out[j] = q[0] * p[j] + p[0] * q[j] + q[a] * p[b] - q[b] * p[a];
 }
 
 /* Let a node turn from the rotations m by the rotation vector to which their change d is tangent. Returns the conformal
- * rotation vector in m, and in `turning` the rotation vector of the step, with whole turns. */
-static void turn_node(const double *d, const double *turned, double *m, double *turning)
+ * rotation vector in m, and in `turning` the rotation vector of the step with whole turns, `before` the change. */
+static void turn_node(const double *d, const double *before, double *m, double *turning)
 {
-  double p[4], way[4] = {0, d[0], d[1], d[2]}, back[4], spin[4], end[4], axis[3], expected[3], whole = 0, far = 0;
-  take_turn(m, p);
-  const double old = p[0], c = 1 / (1 + p[1] * p[1] + p[2] * p[2] + p[3] * p[3]);
-  p[0] = 1;
-  /* spin = p d p* c², with the conjugate p*; the turn before is p p c. */
+  double p[4], way[4] = {0, d[0], d[1], d[2]}, product[4], spin[4], end[4], whole = 0;
+  const double old = take_half(m, p), size = length(p + 1), c = 1 / (1 + size * size);
   const double conjugate[] = {1, -p[1], -p[2], -p[3]};
-  multiply_turns(p, way, back), multiply_turns(back, conjugate, spin);
-  for (int j = 0; j < 3; ++j) spin[1 + j] *= c * c, expected[j] = turned[j] + spin[1 + j], far = hypot(far, expected[j]);
-  const double angle = hypot(hypot(spin[1], spin[2]), spin[3]), f = angle > 0 ? sin(angle / 2) / angle : 0.5;
+  multiply_turns(p, way, product), multiply_turns(product, conjugate, spin);
+  for (int j = 1; j < 4; ++j) spin[j] *= c * c;
+  const double angle = length(spin + 1), f = angle > 0 ? sin(angle / 2) / angle : 0.5;
   way[0] = cos(angle / 2);
   for (int j = 1; j < 4; ++j) way[j] = f * spin[j];
-  multiply_turns(p, p, back), multiply_turns(way, back, end);
-  const double sign = end[0] < 0 ? -1 : 1, sine = c * hypot(hypot(end[1], end[2]), end[3]);
-  const double wide = sine > 0 ? 2 * atan2(sine, fabs(c * end[0])) / sine : 2, flip = old * sign < 0 ? FLIPPED : 0;
+  multiply_turns(p, p, product), multiply_turns(way, product, end);
+  const double sign = end[0] < 0 ? -1 : 1;
   for (int j = 0; j < 4; ++j) end[j] *= sign * c;
-  for (int j = 0; j < 3; ++j) {
-    axis[j] = sine > 1e-8 ? end[1 + j] / sine : far > 0 ? expected[j] / far : 0;
-    whole += axis[j] * (expected[j] - wide * end[1 + j]);
-  }
+  const double sine = length(end + 1), wide = sine > 0 ? 2 * atan2(sine, end[0]) / sine : 2;
+  const double expected[] = {before[0] + spin[1], before[1] + spin[2], before[2] + spin[3]}, far = length(expected);
+  /* Close to whole turns, the axis is that of the expected rotation. */
+  const double *axis = sine > 1e-8 ? end + 1 : expected, unit = sine > 1e-8 ? sine : far > 0 ? far : 1;
+  for (int j = 0; j < 3; ++j) whole += axis[j] / unit * (expected[j] - wide * end[1 + j]);
   whole = 2 * M_PI * round(whole / (2 * M_PI));
-  for (int j = 0; j < 3; ++j) m[j] = 4 * end[1 + j] / (1 + end[0]), turning[j] = wide * end[1 + j] + whole * axis[j];
-  m[0] += flip;
+  for (int j = 0; j < 3; ++j) {
+    m[j] = 4 * end[1 + j] / (1 + end[0]);
+    turning[j] = wide * end[1 + j] + whole * axis[j] / unit;
+  }
+  if (old * sign < 0) m[0] += FLIPPED;
 }
 
 /* Set the iterate x to a fraction of the change from `from`. Rotations in static steps in space are composed: so a beam
@@ -389,14 +391,13 @@ static void move_to(equation *e, double *x, const double *from, double way)
   turn_axes(e->turned, e->axes, to, -1);
   memcpy(x, to, e->size * sizeof *x);
   for (int k = 0; k < e->rotations; k += 3) {
-    double d[3], m[3], turned[3], turning[3];
-    for (int j = 0; j < 3; ++j) {
-      const int i = e->rotation[k + j];
-      d[j] = to[i] - begin[i], m[j] = begin[i] - e->base[i], turned[j] = e->turned_by[i];
-    }
+    const int32_t *i = e->rotation + k;
+    double d[3], m[3], before[3], turning[3];
+    for (int j = 0; j < 3; ++j)
+      d[j] = to[i[j]] - begin[i[j]], m[j] = begin[i[j]] - e->base[i[j]], before[j] = e->turned_by[i[j]];
     if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
-    turn_node(d, turned, m, turning);
-    for (int j = 0; j < 3; ++j) x[e->rotation[k + j]] = e->base[e->rotation[k + j]] + m[j], e->turning[e->rotation[k + j]] = turning[j];
+    turn_node(d, before, m, turning);
+    for (int j = 0; j < 3; ++j) x[i[j]] = e->base[i[j]] + m[j], e->turning[i[j]] = turning[j];
   }
   turn_axes(e->turned, e->axes, x, 1);
   for (int k = 0; k < e->held; ++k) x[e->hold[k]] = e->space[e->hold[k]];
@@ -549,9 +550,9 @@ static int go_to(equation *e, const double *guess, enum tangents kind)
 }
 
 /* Iterations in a row that do not halve the least residual, at which the method stalls: for full
- * steps; for steps that a line search shortens or with stiffer tangents; along paths. Iterates that
+ * steps; for full steps in space; for steps that a line search shortens or with stiffer tangents; along paths. Iterates that
  * wander longer find a solution by luck: round-off of the data would decide. */
-enum { SHORT_PATIENCE = 2, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
+enum { SHORT_PATIENCE = 2, PATIENCE_IN_SPACE = 4, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
 
 /* Iterate from the unknowns; returns the reason to end. */
 static int iterate(equation *e, int patience, int careful)
@@ -619,7 +620,7 @@ static int find_equilibrium(equation *e, const double *guess)
 {
   e->error = 0;
   if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST);
-  int reason = iterate_from(e, guess, e->rotations ? LONG_PATIENCE : SHORT_PATIENCE, PREDICTED);
+  int reason = iterate_from(e, guess, e->rotations ? PATIENCE_IN_SPACE : SHORT_PATIENCE, PREDICTED);
   if (reason == STALLED) {
     restart(e, EXACT);
     reason = iterate(e, LONG_PATIENCE, 1);

@@ -125,15 +125,6 @@ static const double LARGEST_TURN = 2.356;
 /* Largest length of a conformal rotation vector that is extrapolated: of a longer one, whole turns are unknown. */
 static const double FARTHEST = 2;
 
-/* Whether a node has turned far in the last static step in space. */
-static int turned_far(const time_loop *m)
-{
-  const equation *e = m->equation;
-  double most = 0;
-  for (int k = 0; k < e->rotations; ++k) most = fmax(most, fabs(m->q[e->rotation[k]] - m->prediction->q_before[e->rotation[k]]));
-  return most > FARTHEST;
-}
-
 /* Initial guess of the end of the step in the axes of supports: extrapolation of the last steps,
  * and the prescribed motions of supports. Returns 0 if a support turns too far. */
 static int guess(time_loop *m)
@@ -141,8 +132,11 @@ static int guess(time_loop *m)
   const moving_supports *p = m->supports;
   const equation *e = m->equation;
   const double *q = m->q;
+  double far = 0;
+  for (int k = 0; k < e->rotations; ++k)
+    far = fmax(far, fabs(q[e->rotation[k]] - m->prediction->q_before[e->rotation[k]]));
   if (m->prediction->known >= POINTS_OF_GUESS) predict_stage(m->prediction, m->step.t1, m->guess);
-  else if (turned_far(m)) memcpy(m->guess, q, m->size * sizeof *q);
+  else if (far > FARTHEST) memcpy(m->guess, q, m->size * sizeof *q);
   else predict(m->prediction, m->step.dt, q, m->guess);
   turn_axes(e->turned, e->axes, m->guess, 1);
   for (int k = 0; k < p->fixed; ++k) m->guess[p->fix[k]] = 0;
@@ -210,21 +204,13 @@ static void end_search(time_loop *m, int opened)
   }
 }
 
-/* Take the state as the base of rotations in the step, see move_to. */
-static void take_base(const time_loop *m)
-{
-  const equation *e = m->equation;
-  if (!e->rotations) return;
-  memcpy(e->base, m->q, m->size * sizeof *e->base);
-}
-
 /* Find the end of the step from the initial guess. With `hold`, places that do not flow are held
  * closed, except those that must open. */
 static int solve(time_loop *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
-  take_base(m);
+  if (e->rotations) memcpy(e->base, m->q, m->size * sizeof *e->base);
   e->loads = 0;
   for (int k = 0; k < m->loads; ++k) {
     const vector *l = m->load[k];
@@ -296,18 +282,17 @@ static double largest_rigid_turn(const rigid_parts *p, const double *q0, const d
 static void turn_with_nodes(time_loop *m)
 {
   equation *e = m->equation;
-  if (e->border) find_turning(e, e->unknowns);
+  if (e->border || e->monitored) find_turning(e, e->unknowns);
   for (int k = 0; k < e->rotations; k += 3) {
     const int32_t *i = e->rotation + k;
     const double s[] = {m->s[i[0]], m->s[i[1]], m->s[i[2]]};
-    double p[4], q[4], M[4] = {0}, back[4];
-    take_turn(s, p), p[0] = 1;
-    multiply_turns(p, p, q);
-    const double conjugate[4] = {q[0], -q[1], -q[2], -q[3]}, square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    for (int j = 0; j < 3; ++j) m->s[i[j]] = e->turning[i[j]];
+    double p[4], M[4] = {0}, product[4], c = 1;
+    take_half(s, p);
+    for (int j = 1; j < 4; ++j) c += p[j] * p[j], m->s[i[j - 1]] = e->turning[i[j - 1]];
     if (!e->inner_force) continue;
-    for (int j = 0; j < 3; ++j) M[1 + j] = e->inner_force[i[j]] / square;
-    multiply_turns(conjugate, M, back), multiply_turns(back, q, M);
+    const double conjugate[] = {1, -p[1], -p[2], -p[3]};
+    for (int j = 0; j < 3; ++j) M[1 + j] = e->inner_force[i[j]] / (c * c);
+    for (int half = 0; half < 2; ++half) multiply_turns(conjugate, M, product), multiply_turns(product, p, M);
     for (int j = 0; j < 3; ++j) e->inner_force[i[j]] = M[1 + j];
   }
 }
@@ -718,7 +703,7 @@ int repeat_steps(time_loop *m, int number, const double *steps, const double *co
     if (!find_rates(m, t1, end) || !set_step(m, t1, end) || !begin_terms(m)) return k;
     memcpy(e->unknowns, configurations + (size_t)k * m->size, m->size * sizeof *e->unknowns);
     turn_axes(e->turned, e->axes, e->unknowns, 1);
-    take_base(m);
+    if (e->rotations) memcpy(e->base, m->q, m->size * sizeof *e->base);
     find_turning(e, e->unknowns);
     restart(e, EXACT);
     /* Laws with several branches find their branch in the first residual. */
