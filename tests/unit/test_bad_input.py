@@ -117,7 +117,10 @@ PARTS = [
     (lambda: ub.Roller(END, along=(0, 0)), "Roller at girder.end...no direction"),
     (lambda: ub.PrescribedDisplacement(END), "nothing...at least one of u, v, psi"),
     (lambda: ub.Revolute(END), "Revolute: a joint needs at least two places"),
-    (lambda: ub.Spherical(END, BESIDE), "Spherical: the joint is for scenes in space; use Revolute"),
+    (
+        lambda: ub.Spherical(END, BESIDE),
+        "Spherical: the joint is for scenes in space; use Revolute",
+    ),
     (lambda: scene(bodies=[ub.ground(0, 0).body]), "the ground is in every scene; leave it out"),
     (lambda: ub.Body((0, 0), mass=1.0, inertia=(1, 1, 1)), "inertia in the plane is a number"),
     (lambda: HUB.at(0, 0, 0), "hub.at(0.0, 0.0, 0.0): the centre has 2 coordinates"),

@@ -137,3 +137,36 @@ def test_restart_between_large_rotations_changes_no_bit(tmp_path):
         again = statics(scene, 1 / 3, t=(0, end), checkpoint=ub.Checkpoint(tmp_path / "x", every=1))
     assert (again.position(tip) == whole.position(tip)).all()
     assert (again.energy["loads"] == whole.energy["loads"]).all()
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_free_hinge_turns_by_more_than_half_a_turn(steps):
+    """[closed] The angle is the moment about the axis over the stiffness, with all whole turns."""
+    section = ub.Section(EA=1e6, GA=5e5, GA3=5e5, EI=10.0, EI2=10.0, GJ=10.0)
+    beam = ub.Beam((0, 0, 0), (1, 0, 0), section, cells=4)
+    hinge = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=tuple(SKEW))
+    spring = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(2.0), axis=tuple(SKEW))
+    push = ub.PointLoad(beam.end, moment=tuple(9.0 * SKEW), amplitude=lambda t: t)
+    run = statics(ub.Scene([beam], supports=[hinge], connectors=[spring], loads=[push]), 1 / steps)
+    assert np.allclose(run.connector(spring).motion[-1], 4.5, rtol=1e-9)
+    wrapped = Rotation.from_rotvec(4.5 * SKEW).as_rotvec()
+    assert np.abs(run.displacement(beam.start)[-1] - [0, 0, 0, *wrapped]).max() < 1e-9
+    assert np.allclose(run.energy["loads"][-1], 9.0**2 / 2 * (1 / 2.0 + 1 / 10.0), rtol=1e-9)
+
+
+def test_a_pendulum_away_from_its_equilibrium_is_refused():
+    """As in the plane, with finite forces in the message."""
+    section = ub.Section(**{name: 1e3 * x for name, x in (STIFF | OTHER).items()})
+    beam = ub.Beam((0, 0, 0), (np.sin(0.1), 0, -np.cos(0.1)), section)
+    hinge = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=(0, 1, 0))
+    weight = ub.Gravity((0, 0, -9.81), amplitude=lambda t: t)
+    with pytest.raises(ub.ModelError, match="Begin near an equilibrium") as raised:
+        statics(ub.Scene([beam], supports=[hinge], loads=[weight]), 0.1)
+    assert "nan" not in str(raised.value)
+
+
+def test_options_of_petsc_and_the_reference_solver_find_the_same_arc():
+    options = None, ub.Newton(petsc={"snes_max_fail": 3}), ub.Newton(reference=True)
+    runs = [statics(bend(4), 0.125, newton=x) for x in options]
+    tips = [run.position(run.scene.beams[0].end)[-1] for run in runs]
+    assert np.abs(tips - tips[0]).max() < 1e-6

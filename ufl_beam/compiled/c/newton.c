@@ -621,8 +621,9 @@ static int find_equilibrium(equation *e, const double *guess)
   e->error = 0;
   if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST);
   int reason = iterate_from(e, guess, e->rotations ? PATIENCE_IN_SPACE : SHORT_PATIENCE, PREDICTED);
-  if (reason == STALLED) {
-    restart(e, EXACT);
+  if (reason == STALLED || (reason == DIVERGED && e->rotations && raised_anywhere(e) != OTHER)) {
+    if (reason == STALLED) restart(e, EXACT);
+    else go_to(e, guess, EXACT); /* frames that turn by half a turn in a cell have no finite forces */
     reason = iterate(e, LONG_PATIENCE, 1);
   }
   if (reason > 0) return reason;
