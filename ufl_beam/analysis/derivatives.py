@@ -38,7 +38,7 @@ from ufl_beam.errors import (
     shorten,
     warn,
 )
-from ufl_beam.mechanics.time_scheme import Scheme, V, has_inertia, order_of
+from ufl_beam.mechanics.time_scheme import Scheme, V, acts_at_end, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import Block, Column, Columns
@@ -630,8 +630,9 @@ class Derivatives:
         before, solution = self._start or self._case.start, self.solution
         turns = before._turns(p, change)[-1] if before else solution.column(TURNS)[:,][0]
         found, (_, stored, q) = [turns], self._all_ends(p, change)
+        at_end = acts_at_end(solution.scheme)  # type: ignore[arg-type]
         for step, kept in zip(np.diff(q, axis=0), stored, strict=True):
-            turns = turned_further(solution.numbering, turns, step)
+            turns = turned_further(solution.numbering, turns, step, at_end=at_end)
             found += [turns] * int(kept)
         return np.array(found)
 

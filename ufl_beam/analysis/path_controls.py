@@ -114,15 +114,15 @@ class PathCorrector:
     def carried(self, direction: Array, trial: Trial) -> Array:
         """Return a direction at the end of a step, in the unknowns of the next step.
 
-        In space, rotations in a step are Cayley vectors in axes of the nodes before the step.
+        In space, rotations in a step are conformal vectors in axes of the nodes before the step.
         """
         if not self.simulation.scene.in_space:
             return direction
         numbering, carried = self.subdomain.numbering, direction.copy()
         nodes = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[:, 3:]
-        m, w = (trial.q1 - trial.step.q0)[nodes], direction[nodes]
-        turned = w - np.cross(m, w) / 2
-        carried[nodes] = turned / (1 + np.sum(m * m, axis=1, keepdims=True) / 4)
+        p, w = (trial.q1 - trial.step.q0)[nodes] / 4, direction[nodes]
+        c, first = 1 / (1 + np.sum(p * p, axis=1, keepdims=True)), np.cross(w, p)
+        carried[nodes] = c * (w + 2 * c * (first + np.cross(first, p)))
         return carried
 
     def dissipation(self, q: Array) -> float:

@@ -241,7 +241,7 @@ class BeamCells(Block):
         super().__init__(statement, elements, setting, kind="beams")
         self.name, self.fields, self.prediction = name, fields, None
         if not has_inertia(setting.scheme):
-            self.prediction = struct("predicted_forces")
+            self.prediction = struct("predicted_forces", in_space=setting.scene.in_space)
             fill(self._c, predicted=self.prediction)
             self.loops = self.loops[0], loop("add_predicted_tangent", self._c)
         else:

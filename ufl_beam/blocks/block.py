@@ -262,7 +262,8 @@ class Block(LoadTerm):
         for dofs, w in zip(all_dofs, inputs, strict=True):
             w[:unknowns] = q[dofs]
             if self.statement.inserts and self.statement.modes:  # the latest tangent is at q
-                w[-unknowns - 2 :] = [*q[dofs], 1.0, 1.0]
+                about = [*q[dofs], 1.0, 1.0, *q[dofs]]
+                w[-len(self.statement.modes) :][: len(about)] = about
             forces = called(made.force, w)[:unknowns]
             yield dofs, forces, entries, called(made.tangent, w)
 

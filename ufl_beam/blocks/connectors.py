@@ -21,10 +21,9 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.nodes_in_space import (
     UNKNOWNS,
-    change,
     new_state,
-    quaternion,
     quaternion_names,
+    turn_in_step,
     unknowns,
     vector,
 )
@@ -219,7 +218,7 @@ class OnConnector(Statement):
         If the statement has rates, each motion also has its rate before the step, which is its
         variation by the velocities in a step of zero.
         """
-        turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
+        turns = [turn_in_step(at, k, self.scheme) for k in (0, 1)]
         u = ([vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1"))
         a, b = [
             NodeInStep(before, now, turn, tuple(w[:3]), tuple(w[3:]), self.scheme)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Unknowns and states of nodes in space.
 
-A node has six unknowns: its displacement, and numbers whose change in a step is the Cayley vector
-of its rotation in axes of the node, see :mod:`ufl_beam.mechanics.spatial_kinematics`.  So rates of
+A node has six unknowns: its displacement, and numbers whose change in a step is the vector m of
+its rotation in axes of the node, see :mod:`ufl_beam.mechanics.spatial_kinematics`.  So rates of
 these numbers are angular velocities in axes of the node, the mass matrix is constant, and C needs
 no rotations.  Quaternions of nodes are states of the elements.
 """
@@ -20,7 +20,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.statement import Inputs, Statement
 from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.mechanics.spatial_kinematics import Turn, Vector, product, subtract
-from ufl_beam.mechanics.time_scheme import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end
 
 UNKNOWNS = "xyzabc"
 """Displacements along the axes of the scene, then rotations about axes of the node."""
@@ -73,6 +73,12 @@ def vector(at: Inputs, group: str, names: str, k: int) -> Vector:
 def change(at: Inputs, names: str, k: int) -> Vector:
     """Return the change of some unknowns of a node in the step."""
     return subtract(vector(at, "q1", names, k), vector(at, "q0", names, k))
+
+
+def turn_in_step(at: Inputs, k: int, scheme: Scheme) -> Turn:
+    """Return the rotation of a node in the step."""
+    m, q0 = change(at, "abc", k), quaternion(at, k)
+    return Turn(at.stage, m, q0, at_end=acts_at_end(scheme))
 
 
 def new_state(turns: Sequence[Turn], to_node: Vector | None = None) -> dict[str, Expr]:

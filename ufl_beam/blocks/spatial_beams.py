@@ -24,7 +24,7 @@ from ufl_beam.blocks.nodes_in_space import (
     matrix_of,
     new_state,
     places_of_turns,
-    quaternion,
+    turn_in_step,
     vector,
 )
 from ufl_beam.blocks.statement import Equations, Inputs
@@ -93,9 +93,9 @@ class CellInSpace(InertiaInSpace):
 
     @property
     def modes(self) -> Sequence[str]:
-        """In statics the same as of :class:`~ufl_beam.blocks.beams.BeamCell`."""
-        at_rest = [*(f"about {x}" for x in self.unknowns), "moved", "reached"]
-        return [] if has_inertia(self.scheme) else at_rest
+        """In statics as of :class:`~ufl_beam.blocks.beams.BeamCell`, and predicted motions."""
+        about, to = ([f"{x} {y}" for y in self.unknowns] for x in ("about", "to"))
+        return [] if has_inertia(self.scheme) else [*about, "moved", "reached", *to]
 
     @property
     def numbers(self) -> list[str]:
@@ -115,8 +115,8 @@ class CellInSpace(InertiaInSpace):
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
         h, axes, at_end = at["h"], matrix_of(at, "R"), acts_at_end(self.scheme)
-        q0 = [quaternion(at, k) for k in (0, 1)]
-        turns = [Turn(at.stage, change(at, "abc", k), q0[k]) for k in (0, 1)]
+        turns = [turn_in_step(at, k, self.scheme) for k in (0, 1)]
+        q0 = [turn.q0 for turn in turns]
         u = [[vector(at, group, "xyz", k) for k in (0, 1)] for group in ("q0", "q1")]
         slopes = [tuple(map(at.stage, scale(1 / h, subtract(b, a)))) for a, b in u]
         old, now = Middle(at.stage, *q0), Middle(at.stage, *(turn.q1 for turn in turns))
@@ -132,7 +132,7 @@ class CellInSpace(InertiaInSpace):
         both = tuple(r[:3]), tuple(r[3:])
         resultants = [tuple(map(at.stage, transposed_times(axes, x))) for x in both]
         N, *moments = forces_over_step(at.stage, pair, (old, now), tangents, h, resultants)
-        on_nodes = [x.on_node(M, at_end=at_end) for x, M in zip(turns, moments, strict=True)]
+        on_nodes = [x.on_node(M) for x, M in zip(turns, moments, strict=True)]
         if self.rates:
             turning = self._turning(at, [turn.m for turn in turns])
             on_nodes = [add(x, y) for x, y in zip(on_nodes, turning, strict=True)]
@@ -149,11 +149,11 @@ class CellInSpace(InertiaInSpace):
         for k in (0, 1):
             last, further = (
                 subtract(vector(at, group, "xyzabc", k), vector(at, before, "xyzabc", k))
-                for group, before in (("about", "q0"), ("q1", "about"))
+                for group, before in (("about", "q0"), ("to", "about"))
             )
             moved = add(last, scale(along, further))
             u.append(add(u0[k], moved[:3]))
-            turns.append(Turn(_same, moved[3:], q0[k]))
+            turns.append(Turn(_same, moved[3:], q0[k], at_end=acts_at_end(self.scheme)))
         slope = scale(1 / at["h"], subtract(u[1], u[0]))
         e = _strains(Middle(_same, *(turn.q1 for turn in turns)), slope, axes, at["h"])
         return tuple(x + at["moved"] * ufl.diff(x, along) for x in e)
@@ -392,7 +392,7 @@ class TurningBody(InertiaInSpace):
         """See the base class."""
         m = change(at, "abc", 0)
         none = [m[0] - m[0]] * 3  # UFL would drop forces that are all zero
-        state = new_state([Turn(at.stage, m, quaternion(at, 0))])
+        state = new_state([turn_in_step(at, 0, self.scheme)])
         if not self.rates:
             return Equations([*none, *none], state)
         P = times(matrix_of(at, "J"), self.spin(at, 0))

@@ -19,16 +19,15 @@ from ufl_beam.blocks.nodes_in_space import (
     change,
     matrix_of,
     new_state,
-    quaternion,
+    turn_in_step,
     unknowns,
     vector,
 )
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.compiled.c_library import fill
 from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.spatial_kinematics import (
-    Middle,
-    Turn,
     add,
     between,
     cross,
@@ -75,15 +74,9 @@ class LoadOnNode(StatementInSpace):
         """Moment, and force of a load that follows, in the undeformed scene."""
         return [f"{x}{i}" for x in "MF"[: 1 + self.follows] for i in range(3)]
 
-    @property
-    def state(self) -> list[str]:
-        """Quaternion; if the equation holds at the end of a step, the loads at the last end."""
-        before = [f"last {x}" for x in self.numbers] if acts_at_end(self.scheme) else []
-        return [*before, *super().state]
-
     def equations(self, at: Inputs) -> Equations:
-        """See the base class; the work in statics is of the mean load on the rotation vector."""
-        turn = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0))
+        """See the base class."""
+        turn = turn_in_step(at, 0, self.scheme)
         M, *F = (
             scale(at["factor"], tuple(at[f"{x}{i}"] for i in range(3)))
             for x in "MF"[: 1 + self.follows]
@@ -93,16 +86,7 @@ class LoadOnNode(StatementInSpace):
             frame = matrix(between(at.stage, turn.q0, turn.q1, self.scheme.load_weight))
             M, F = times(frame, M), [times(frame, F[0])]
             forces = scale(-1.0, F[0])
-        on_node = turn.on_node(M, at_end=acts_at_end(self.scheme))
-        made = Equations([*forces, *scale(-1.0, on_node)], new_state([turn]))
-        if not acts_at_end(self.scheme):
-            return made
-        turned = times(turn.frame, Middle(at.stage, turn.q0, turn.q1).rotation_vector)
-        moved, loads = (*turned, *change(at, "xyz", 0)), (M, *F)
-        now = dict(zip(self.state, (x for load in loads for x in load), strict=False))
-        pairs = zip(now.items(), moved, strict=False)
-        work = sum(0.5 * (at[name] + x) * way for (name, x), way in pairs)
-        return made._replace(state=now | {**made.state}, supplied={"loads": work})
+        return Equations([*forces, *scale(-1.0, turn.on_node(M))], new_state([turn]))
 
 
 @dataclass(frozen=True)
@@ -121,7 +105,7 @@ class PressureInSpace(StatementInSpace):
     def equations(self, at: Inputs) -> Equations:
         """See the base class; the derivative of the axis has the length of its part of the cell."""
         w, axes = self.scheme.load_weight, matrix_of(at, "R")
-        turns = [Turn(at.stage, change(at, "abc", k), quaternion(at, k)) for k in (0, 1)]
+        turns = [turn_in_step(at, k, self.scheme) for k in (0, 1)]
         u = [add(vector(at, "q0", "xyz", k), scale(w, change(at, "xyz", k))) for k in (0, 1)]
         first, last = (between(at.stage, turn.q0, turn.q1, w) for turn in turns)
         frame = matrix(between(at.stage, first, last))
@@ -195,7 +179,7 @@ class MomentOfRotatingFrame(StatementInSpace):
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class; the mean of the frames in the step makes the increment exact."""
-        turn, w = Turn(at.stage, change(at, "abc", 0), quaternion(at, 0)), self.scheme.load_weight
+        turn, w = turn_in_step(at, 0, self.scheme), self.scheme.load_weight
         frames = matrix(turn.q0), matrix(turn.q1)
         frame = [
             tuple(map(at.stage, add(scale(1.0 - w, x), scale(w, y))))
@@ -208,8 +192,7 @@ class MomentOfRotatingFrame(StatementInSpace):
         if has_inertia(self.scheme):
             H = subtract(scale(2.0, Jb), scale(J[0][0] + J[1][1] + J[2][2], b))
             moment = add(moment, times(frame, scale(1 / at["dt"], cross(turn.m, H))))
-        on_node = turn.on_node(moment, at_end=acts_at_end(self.scheme))
-        return Equations([*NO_FORCE, *on_node], new_state([turn]))
+        return Equations([*NO_FORCE, *turn.on_node(moment)], new_state([turn]))
 
 
 class LoadsInSpace(Block):
@@ -217,10 +200,9 @@ class LoadsInSpace(Block):
 
     remembers = True
 
-
-def own_work(statement: Statement) -> bool:
-    """Return whether a statement has the work of its load, as moments at the end of a step."""
-    return isinstance(statement, LoadOnNode) and acts_at_end(statement.scheme)
+    def __init__(self, statement: StatementInSpace, *others: Any, **more: Any) -> None:
+        super().__init__(statement, *others, **more)
+        fill(self._c, turns=acts_at_end(statement.scheme))
 
 
 def loads_in_space(setting: BlockSetting) -> list[Block]:
@@ -238,7 +220,7 @@ def loads_in_space(setting: BlockSetting) -> list[Block]:
     ]  # fmt: skip
     return [
         (LoadsInSpace if isinstance(statement, StatementInSpace) else Block)(
-            statement, elements, setting, supplies=None if own_work(statement) else "loads"
+            statement, elements, setting, supplies="loads"
         )
         for statement, elements in made
     ]

@@ -12,6 +12,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors, values_at
 from ufl_beam.discretization.function_spaces import STIFFNESS, Fields
+from ufl_beam.mechanics.spatial_kinematics import FLIPPED
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, arm
 
 TURNS = "turns"
@@ -194,11 +195,17 @@ def velocity_in_space(
     return motion
 
 
-def turned_further(numbering: DofNumbering, turns: Array, change: Array) -> Array:
-    """Return :data:`TURNS` after changes of the unknowns, which are Cayley vectors; (nodes, 4)."""
+def turned_further(
+    numbering: DofNumbering, turns: Array, change: Array, *, at_end: bool = False
+) -> Array:
+    """Return :data:`TURNS` after changes of the unknowns in a step; (nodes, 4).
+
+    They are Cayley vectors, or conformal rotation vectors if the step is solved ``at_end``.
+    """
     dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[: len(turns), 3:]
-    steps = Rotation.from_quat(np.pad(change[dofs] / 2, ((0, 0), (0, 1)), constant_values=1.0))
-    quaternions = (_rotations(turns) * steps).as_quat()
+    m = change[dofs] - at_end * FLIPPED * np.rint(change[dofs] / FLIPPED)
+    real = 1 - at_end * np.sum(m * m, axis=1) / 16
+    quaternions = (_rotations(turns) * Rotation.from_quat(np.column_stack([m / 2, real]))).as_quat()
     return np.asarray(np.roll(quaternions, 1, axis=1) - np.eye(4)[0])
 
 

@@ -4,7 +4,8 @@
 Vectors and quaternions (real part first) are tuples of scalars in UFL.  A node has a unit
 quaternion q, which is 1 in the undeformed scene.  In a step it turns to q (1, m/2)/|.|, with the
 Cayley vector m = 2 tan(θ/2) n in axes of the node.  The rotations in a step are exact: directors
-are linear in them, so that energy and momenta are conserved.
+are linear in them, so that energy and momenta are conserved.  If the equation of a step holds at
+its end, m is the conformal rotation vector 4 tan(θ/4) n instead, which turns by any angle.
 
 The frame of a cell is the middle between the frames of its two nodes.  The strains are Λᵀ φ' - t,
 with the frame Λ and the slope φ' of the axis, and the rotation vector between the nodes over the
@@ -108,23 +109,41 @@ def between(stage: Callable[[Any], Any], q0: Vector, q1: Vector, fraction: float
     return scale(stage(1 / ufl.sqrt(dot(q, q))), q)
 
 
+FLIPPED = 32
+"""Added to a conformal rotation vector where the quaternion has the other sign, see newton.c."""
+
+
+def _flips(x: Any) -> Any:
+    """Return 1, -1 or 0: whether :data:`FLIPPED` is added to a number, or subtracted from it."""
+    some = [ufl.conditional(ufl.gt(way * x, FLIPPED / 2), 1.0, 0.0) for way in (1, -1)]
+    return some[0] - some[1]
+
+
 class Turn:
     """Rotation of a node in a step.
 
     Attributes:
-        m: Cayley vector in axes of the node.
+        m: Cayley vector in axes of the node, or conformal rotation vector ``at_end`` of the step.
         q0, q1: Quaternions before and after the step.
-        c: Cosine of half the angle.
+        c: Cosine of half the angle, not ``at_end``.
         s: Cayley vector in axes of the scene.
         frame: Rotation matrix before the step, by which virtual rotations turn.
     """
 
-    def __init__(self, stage: Callable[[Any], Any], m: Vector, q0: Vector) -> None:
+    def __init__(
+        self, stage: Callable[[Any], Any], m: Vector, q0: Vector, *, at_end: bool = False
+    ) -> None:
         self.m, self.q0, self.frame = m, q0, matrix(q0)
-        v = scale(0.5, m)
-        self.c = stage(1 / ufl.sqrt(1 + dot(v, v)))
-        q1 = product(q0, (ufl.as_ufl(1.0), *v))
-        self.q1 = tuple(stage(self.c * x) for x in q1)
+        if at_end:
+            flips = _flips(m[0])
+            p = scale(0.25, (m[0] - FLIPPED * flips, *m[1:]))
+            c = stage((1 - 2 * abs(flips)) / (1 + dot(p, p)))
+            q1 = product(q0, (c * (1 - dot(p, p)), *scale(2 * c, p)))
+            self.q1 = tuple(map(stage, q1))
+        else:
+            v = scale(0.5, m)
+            self.c = stage(1 / ufl.sqrt(1 + dot(v, v)))
+            self.q1 = tuple(stage(self.c * x) for x in product(q0, (ufl.as_ufl(1.0), *v)))
         self.s = tuple(map(stage, times(self.frame, m)))
 
     @property
@@ -138,18 +157,13 @@ class Turn:
         none = ufl.as_ufl(0.0)
         return SimpleNamespace(q0=self.q1, q1=self.q1, c=ufl.as_ufl(1.0), s=(none, none, none))
 
-    def virtual_rotation(self, w: Vector, *, at_end: bool = False) -> Vector:
-        """Return the virtual rotation, in axes of the scene, of a virtual m; see on_node."""
-        if at_end:
-            w = scale(self.c * self.c, add(w, scale(0.5, cross(self.m, w))))
+    def virtual_rotation(self, w: Vector) -> Vector:
+        """Return the virtual rotation in axes of the scene, from one in axes of the node before."""
         return times(self.frame, w)
 
-    def on_node(self, moment: Vector, *, at_end: bool = False) -> Vector:
-        """Return the moment that works on m over the step, or on a change of m ``at_end``."""
-        on_step = transposed_times(self.frame, moment)
-        if not at_end:
-            return on_step
-        return scale(self.c * self.c, add(on_step, scale(0.5, cross(on_step, self.m))))
+    def on_node(self, moment: Vector) -> Vector:
+        """Return a moment in axes of the node before the step."""
+        return transposed_times(self.frame, moment)
 
 
 class Middle:

@@ -54,7 +54,7 @@ class NodeInStep:
     ) -> None:
         self.u0, self.u1, self.turn, self.w_u = u0, u1, turn, w_u
         self._scheme, self._turned = scheme, (turned(turn.q0), turned(turn.q1))
-        self.w_θ = turn.virtual_rotation(w_m, at_end=acts_at_end(scheme))
+        self.w_θ = turn.virtual_rotation(w_m)
 
     def changes(self, x: Vector) -> tuple[Vector, Vector]:
         """Return the change of a vector that is fixed in the node, before and after the step.

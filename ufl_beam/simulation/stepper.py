@@ -22,7 +22,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ModelError, StepFailed
-from ufl_beam.mechanics.time_scheme import Step, stages_of, with_half_tangents
+from ufl_beam.mechanics.time_scheme import Step, acts_at_end, stages_of, with_half_tangents
 from ufl_beam.model.bodies import base_of
 from ufl_beam.model.connector_laws import PrescribedMotion
 from ufl_beam.model.constraint_checks import INSTEAD, describe_motions
@@ -267,6 +267,11 @@ class Stepper(StateView):
             stages=len(stages), stage=np.cumsum(stages),
             begun=np.zeros((len(stages) - 1, subdomain.size)), stage_begin=np.zeros(len(stages)),
         )  # fmt: skip
+        if self.scene.in_space and acts_at_end(scheme):
+            spaces: Array = np.zeros((4, subdomain.size))
+            base, turning, turned_by, to = spaces
+            fill(equation.c, rotations=len(rotations), rotation=rotations, base=base,
+                 turning=turning, turned_by=turned_by, to=to)  # fmt: skip
         if self.time_loop.opens:
             fill(self.time_loop, found=np.zeros(subdomain.size))
         if equation.supports.turned:

@@ -56,11 +56,6 @@ static void set_mode(const element_block *b, int mode, double value)
 
 /* Whether predictions of cells follow the motion since the latest tangent; part of the change of imposed strains in
  * the step that they contain. */
-static void set_prediction(const element_block *b, int moved, double reached)
-{
-  set_mode(b, b->unknowns, moved), set_mode(b, b->unknowns + 1, reached);
-}
-
 /* Write the configuration q into the motions of elements, from the input `first` on. */
 static void gather(const element_block *b, const double *q, int first)
 {
@@ -79,6 +74,13 @@ static void gather(const element_block *b, const double *q, int first)
       for (int i = 0; i < all; ++i) w[i] = q[dofs[i]];
     }
   }
+}
+
+static void set_prediction(const element_block *b, const double *q, int moved, double reached)
+{
+  const predicted_forces *p = b->predicted;
+  set_mode(b, b->unknowns, moved), set_mode(b, b->unknowns + 1, reached);
+  if (p->in_space) gather(b, p->to && !p->exact ? p->to : q, about(b) + b->unknowns + 2);
 }
 
 /* Add the first `each` outputs of a function of elements to `out` at indices. */
@@ -316,7 +318,7 @@ void add_predicted_tangent(void *self, const double *q, double *tangent)
   if (p->begins)
     FOR_ACTING(b, c) memcpy(input(b, c, about(b)), input(b, c, b->unknowns), all * sizeof *q);
   else if (p->exact) gather(b, q, about(b));
-  set_prediction(b, !p->begins, !p->begins);
+  set_prediction(b, q, !p->begins, !p->begins);
   add_cells((void *)b->inserted, q, tangent);
   gather(b, q, about(b));
   p->begins = 0, p->stale = 1;
@@ -404,14 +406,28 @@ void end_step_of_block(const element_block *b, const double *q, enum end_of_step
     if (what != TRIAL || i % b->shares >= b->kept) b->shared[i] = sum[i];
 }
 
+/* Forces of loads at the state q, as a step from there begins with. */
+static void find_forces_at_rest(const element_block *b, const double *q)
+{
+  gather(b, q, 0), gather(b, q, b->unknowns);
+  FOR_ACTING(b, c) {
+    const size_t states = (size_t)b->states * b->lanes;
+    memcpy(input(b, c, first_state(b)), b->state + c * states, states * sizeof *b->w);
+  }
+  evaluate(b, b->force_of, b->out);
+  memset(b->force, 0, b->size * sizeof *b->force);
+  scatter(b, b->force_of, b->unknowns, b->out, b->at, b->force);
+}
+
 void accept_block(void *self, const time_step *step, const double *q1, const double *s)
 {
   const element_block *b = self;
+  if (b->turns) end_step_of_block(b, q1, ACCEPT), find_forces_at_rest(b, q1);
   if (b->work) *b->work -= work_in_step(b->size, b->dof, b->weight_of_before, b->force_before, b->force, s);
   memcpy(b->force_before, b->force, b->size * sizeof *b->force);
   memcpy(b->before, b->end, b->functions * sizeof *b->before);
   b->t[0] = b->t[1], *b->begun = 1;
-  end_step_of_block(b, q1, ACCEPT);
+  if (!b->turns) end_step_of_block(b, q1, ACCEPT);
 }
 
 void add_energy_of_block(void *self, const time_step *step, const double *q1, const double *s)

@@ -43,16 +43,16 @@ static void predict_strains(const inelastic *m, const double *q)
   p->stale = 0;
   if (!p->begins) {
     if (p->exact) gather(b, q, about(b));
-    set_prediction(b, 1, 1);
+    set_prediction(b, q, 1, 1);
     find_sections(m, m->predicted, q, m->e);
     return;
   }
   gather(b, m->q0, about(b));
-  set_prediction(b, 0, ratio / (1 + ratio));
+  set_prediction(b, q, 0, ratio / (1 + ratio));
   find_sections(m, m->predicted, q, m->e);
   if (ratio == 0) return;
   gather(b, m->q_before, about(b));
-  set_prediction(b, 0, 0);
+  set_prediction(b, q, 0, 0);
   find_sections(m, m->predicted, q, m->change);
   for (int k = 0; k < last; ++k) m->e[k] = (1 + ratio) * m->e[k] - ratio * m->change[k];
 }

@@ -50,8 +50,9 @@ struct cells {
 
 /* State of the forces that the tangents of cells in a static step contain. begins: forces before the step, or forces
  * at extrapolated strains; exact: later forces are forces at the iterate, not predicted; stale: whether a tangent has
- * been computed since the prediction. */
-typedef struct { int32_t begins, exact, stale; } predicted_forces;
+ * been computed since the prediction; to: the configuration to which the tangent has predicted a change, in space, if
+ * it is not the iterate; in_space: whether cells have motions to it. */
+typedef struct { int32_t begins, exact, stale, in_space; const double *to; } predicted_forces;
 
 /* Some entries of a vector, or all of them. */
 typedef struct {
@@ -481,6 +482,12 @@ typedef struct {
   predicted_forces *const *predicted;
   int32_t *search;       /* flags of points that may open; or none */
   phases again;          /* restart a step: discard the trial values of iterates */
+  /* Of static steps in space, see move_to, in axes of the scene: rotations of nodes, three of each; base: unknowns before
+   * the step; turning, turned_by: rotation vectors of the step, to the iterate and before its latest change; to: see
+   * predicted_forces. */
+  int rotations;
+  const int32_t *rotation;
+  double *base, *turning, *turned_by, *to;
   double *conjugate, *start, *aside; /* space: of a line search; of a solution with stiffer tangents */
   void *handle;
   void (*agree)(void *handle, int number, const int *how, double *values); /* none on one process */
@@ -654,6 +661,7 @@ struct element_block {
   const cells *inserted;    /* cells whose tangent is inserted as that of a form; or none */
   predicted_forces *predicted; /* of cells in static steps; further modes are then motions at the latest tangent, and
                              * two numbers, see set_prediction */
+  int turns;                /* of loads: whether moments are in axes of nodes before the step, at the end of which they act */
 };
 
 /* A block, and the same in a neighbouring scene, whose state follows from the configuration. */

@@ -214,7 +214,7 @@ static int test_convergence(equation *e, const double *x, int iteration)
     if ((stays || residual <= floor / 80) && laws_met(e, x, scale)) return AT_ROUND_OFF;
     /* With a kept tangent, the residual falls by twice the last factor. It must fall far enough
      * that works are the same as with a new tangent. */
-    e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
+    e->near = !kept && !e->rotations && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
   }
   /* A tangent with the row of a motion does not fit the row of a force: newtons of the residual
    * would become metres of the change. */
@@ -223,7 +223,8 @@ static int test_convergence(equation *e, const double *x, int iteration)
   /* Directly after the activation of a connector, balanced forces are no measure of convergence, as
    * its law is not met yet. */
   const double size = iteration > 0 || met ? residual : scale;
-  if (size <= e->best / 2) e->best = size, e->slow = 0;
+  /* Full steps of rotations in space leave the guess far: later residuals fall from that of the first iterate. */
+  if (size <= e->best / 2 || (iteration == 1 && e->rotations && !e->careful)) e->best = size, e->slow = 0;
   e->last = residual;
   return e->slow == e->patience ? STALLED : ITERATING;
 }
@@ -311,6 +312,98 @@ static double work_of_residual(const equation *e)
   return over_processes(e, TOTAL, sum);
 }
 
+/* Added to the first component of a conformal rotation vector, of length 4 at most, if the node has turned by between
+ * 180 and 540 degrees: then its quaternion has the other sign. See Turn in spatial_kinematics.py. */
+static const double FLIPPED = 32;
+
+/* The quaternion (1, p), without its length, of which the square is the rotation of a conformal rotation vector m; returns
+ * the sign of that. */
+static int take_half(const double *m, double *p)
+{
+  const double flips = fabs(m[0]) > FLIPPED / 2 ? copysign(FLIPPED, m[0]) : 0;
+  p[0] = 1, p[1] = (m[0] - flips) / 4, p[2] = m[1] / 4, p[3] = m[2] / 4;
+  return flips ? -1 : 1;
+}
+
+static double length(const double *v) { return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+/* Rotation vectors of the step to x, of less than a turn. */
+static void find_turning(const equation *e, const double *x)
+{
+  if (e->rotations) x = in_plane(e, x);
+  for (int k = 0; k < e->rotations; k += 3) {
+    const int32_t *i = e->rotation + k;
+    const double m[] = {x[i[0]] - e->base[i[0]], x[i[1]] - e->base[i[1]], x[i[2]] - e->base[i[2]]};
+    double p[4];
+    const double whole = take_half(m, p) < 0 ? 2 * M_PI : 0, size = length(p + 1);
+    for (int j = 0; j < 3; ++j) e->turning[i[j]] = size > 0 ? (4 * atan(size) - whole) / size * p[1 + j] : m[j];
+  }
+}
+
+/* Product of quaternions. */
+static void multiply_turns(const double *q, const double *p, double *out)
+{
+  out[0] = q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3];
+  for (int j = 1, a = 2, b = 3; j < 4; ++j, a = a % 3 + 1, b = b % 3 + 1)
+    out[j] = q[0] * p[j] + p[0] * q[j] + q[a] * p[b] - q[b] * p[a];
+}
+
+/* Let a node turn from the rotations m by the rotation vector to which their change d is tangent. Returns the conformal
+ * rotation vector in m, and in `turning` the rotation vector of the step with whole turns, `before` the change. */
+static void turn_node(const double *d, const double *before, double *m, double *turning)
+{
+  double p[4], way[4] = {0, d[0], d[1], d[2]}, product[4], spin[4], end[4], whole = 0;
+  const double old = take_half(m, p), size = length(p + 1), c = 1 / (1 + size * size);
+  const double conjugate[] = {1, -p[1], -p[2], -p[3]};
+  multiply_turns(p, way, product), multiply_turns(product, conjugate, spin);
+  for (int j = 1; j < 4; ++j) spin[j] *= c * c;
+  const double angle = length(spin + 1), f = angle > 0 ? sin(angle / 2) / angle : 0.5;
+  way[0] = cos(angle / 2);
+  for (int j = 1; j < 4; ++j) way[j] = f * spin[j];
+  multiply_turns(p, p, product), multiply_turns(way, product, end);
+  const double sign = end[0] < 0 ? -1 : 1;
+  for (int j = 0; j < 4; ++j) end[j] *= sign * c;
+  const double sine = length(end + 1), wide = sine > 0 ? 2 * atan2(sine, end[0]) / sine : 2;
+  const double expected[] = {before[0] + spin[1], before[1] + spin[2], before[2] + spin[3]}, far = length(expected);
+  /* Close to whole turns, the axis is that of the expected rotation. */
+  const double *axis = sine > 1e-8 ? end + 1 : expected, unit = sine > 1e-8 ? sine : far > 0 ? far : 1;
+  for (int j = 0; j < 3; ++j) whole += axis[j] / unit * (expected[j] - wide * end[1 + j]);
+  whole = 2 * M_PI * round(whole / (2 * M_PI));
+  for (int j = 0; j < 3; ++j) {
+    m[j] = 4 * end[1 + j] / (1 + end[0]);
+    turning[j] = wide * end[1 + j] + whole * axis[j] / unit;
+  }
+  if (old * sign < 0) m[0] += FLIPPED;
+}
+
+/* Set the iterate x to a fraction of the change from `from`. Rotations in static steps in space are composed: so a beam
+ * that rolls up turns as far as the linear equation says. */
+static void move_to(equation *e, double *x, const double *from, double way)
+{
+  double *to = e->to;
+  if (!e->rotations || e->border) {
+    for (int i = 0; i < e->owned; ++i) x[i] = from[i] - way * e->change[i];
+    return;
+  }
+  memcpy(e->space, from, e->size * sizeof *x);
+  const double *begin = in_plane(e, e->space);
+  for (int i = 0; i < e->size; ++i) to[i] = e->space[i] - way * e->change[i];
+  turn_axes(e->turned, e->axes, to, -1);
+  memcpy(x, to, e->size * sizeof *x);
+  for (int k = 0; k < e->rotations; k += 3) {
+    const int32_t *i = e->rotation + k;
+    double d[3], m[3], before[3], turning[3];
+    for (int j = 0; j < 3; ++j)
+      d[j] = to[i[j]] - begin[i[j]], m[j] = begin[i[j]] - e->base[i[j]], before[j] = e->turned_by[i[j]];
+    if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+    turn_node(d, before, m, turning);
+    for (int j = 0; j < 3; ++j) x[i[j]] = e->base[i[j]] + m[j], e->turning[i[j]] = turning[j];
+  }
+  turn_axes(e->turned, e->axes, x, 1);
+  for (int k = 0; k < e->held; ++k) x[e->hold[k]] = e->space[e->hold[k]];
+  for (int k = 0; k < e->predictions; ++k) e->predicted[k]->to = to;
+}
+
 /* Line search by secants: take the fraction of the full change at which the residual does no work
  * on it.
  *
@@ -328,7 +421,7 @@ static int search(equation *e, double *x)
   double before = work_of_residual(e), last = 0, way = 1;
   const double first = fabs(before);
   for (int k = 1;; ++k) {
-    for (int i = 0; i < e->owned; ++i) x[i] = e->start[i] - way * e->change[i];
+    move_to(e, x, e->start, way);
     TRY(residual_at(e, x));
     const double now = work_of_residual(e), slope = (now - before) / (way - last);
     if (k == EVALUATIONS || !(fabs(now) > PART * first) || slope == 0) return 0;
@@ -359,9 +452,10 @@ static int newton(equation *e, double *x)
       e->reason = SINGULAR;
       return 0;
     }
+    if (e->rotations) memcpy(e->turned_by, e->turning, e->size * sizeof *x);
     if (e->careful) TRY(search(e, x));
     else {
-      for (int i = 0; i < e->owned; ++i) x[i] -= e->change[i];
+      move_to(e, x, x, 1);
       TRY(residual_at(e, x));
     }
     ++e->iterations;
@@ -439,7 +533,7 @@ void restart(const equation *e, enum tangents kind)
 {
   for (int k = 0; k < e->predictions; ++k) {
     predicted_forces *p = e->predicted[k];
-    p->begins = kind != EXACT, p->stale = 1, p->exact = kind != PREDICTED;
+    p->begins = kind != EXACT, p->stale = 1, p->exact = kind != PREDICTED, p->to = 0;
   }
 }
 
@@ -450,14 +544,15 @@ static int go_to(equation *e, const double *guess, enum tangents kind)
   TRY(petsc.VecGetArray(e->x, &q)); /* tells PETSc of the change */
   if (guess != e->unknowns) memcpy(e->unknowns, guess, e->size * sizeof *guess);
   TRY(petsc.VecRestoreArray(e->x, &q));
+  find_turning(e, e->unknowns);
   restart(e, kind);
   return 0;
 }
 
 /* Iterations in a row that do not halve the least residual, at which the method stalls: for full
- * steps; for steps that a line search shortens or with stiffer tangents; along paths. Iterates that
+ * steps; for full steps in space; for steps that a line search shortens or with stiffer tangents; along paths. Iterates that
  * wander longer find a solution by luck: round-off of the data would decide. */
-enum { SHORT_PATIENCE = 2, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
+enum { SHORT_PATIENCE = 2, PATIENCE_IN_SPACE = 4, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
 
 /* Iterate from the unknowns; returns the reason to end. */
 static int iterate(equation *e, int patience, int careful)
@@ -525,9 +620,10 @@ static int find_equilibrium(equation *e, const double *guess)
 {
   e->error = 0;
   if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST);
-  int reason = iterate_from(e, guess, SHORT_PATIENCE, PREDICTED);
-  if (reason == STALLED) {
-    restart(e, EXACT);
+  int reason = iterate_from(e, guess, e->rotations ? PATIENCE_IN_SPACE : SHORT_PATIENCE, PREDICTED);
+  if (reason == STALLED || (reason == DIVERGED && e->rotations && raised_anywhere(e) != OTHER)) {
+    if (reason == STALLED) restart(e, EXACT);
+    else go_to(e, guess, EXACT); /* frames that turn by half a turn in a cell have no finite forces */
     reason = iterate(e, LONG_PATIENCE, 1);
   }
   if (reason > 0) return reason;

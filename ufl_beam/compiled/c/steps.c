@@ -118,8 +118,12 @@ static int begin_terms(time_loop *m)
   return raised_anywhere(m->equation) == NOTHING;
 }
 
-/* Largest prescribed rotation in a step in space, where a rotation about an axis is 2 tan(angle / 2). */
+/* Largest prescribed rotation in a step in space, where a rotation about an axis is 2 tan(angle / 2), or in statics
+ * 4 tan(angle / 4). */
 static const double LARGEST_TURN = 2.356;
+
+/* Largest length of a conformal rotation vector that is extrapolated: of a longer one, whole turns are unknown. */
+static const double FARTHEST = 2;
 
 /* Initial guess of the end of the step in the axes of supports: extrapolation of the last steps,
  * and the prescribed motions of supports. Returns 0 if a support turns too far. */
@@ -128,7 +132,11 @@ static int guess(time_loop *m)
   const moving_supports *p = m->supports;
   const equation *e = m->equation;
   const double *q = m->q;
+  double far = 0;
+  for (int k = 0; k < e->rotations; ++k)
+    far = fmax(far, fabs(q[e->rotation[k]] - m->prediction->q_before[e->rotation[k]]));
   if (m->prediction->known >= POINTS_OF_GUESS) predict_stage(m->prediction, m->step.t1, m->guess);
+  else if (far > FARTHEST) memcpy(m->guess, q, m->size * sizeof *q);
   else predict(m->prediction, m->step.dt, q, m->guess);
   turn_axes(e->turned, e->axes, m->guess, 1);
   for (int k = 0; k < p->fixed; ++k) m->guess[p->fix[k]] = 0;
@@ -143,7 +151,7 @@ static int guess(time_loop *m)
     const int i = p->dof[k], turns = k >= p->moving - p->driven;
     const double from = turns ? *angle++ : q[i];
     double change = m->step.fraction * (value_at(p->motion + k, m->step.motion_time) - from);
-    if (turns) turn = fmax(turn, fabs(change)), change = 2 * tan(change / 2);
+    if (turns) turn = fmax(turn, fabs(change)), change = p->at_end ? 4 * tan(change / 4) : 2 * tan(change / 2);
     m->guess[i] = q[i] + change;
   }
   for (int k = 0; k < p->hinges; ++k)
@@ -202,6 +210,7 @@ static int solve(time_loop *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
+  if (e->rotations) memcpy(e->base, m->q, m->size * sizeof *e->base);
   e->loads = 0;
   for (int k = 0; k < m->loads; ++k) {
     const vector *l = m->load[k];
@@ -268,6 +277,26 @@ static double largest_rigid_turn(const rigid_parts *p, const double *q0, const d
   return turn;
 }
 
+/* In statics in space: let moments do work on the rotation vectors of the step, and turn the moments of internal forces
+ * into axes of the nodes at the end of the step. */
+static void turn_with_nodes(time_loop *m)
+{
+  equation *e = m->equation;
+  if (e->border || e->monitored) find_turning(e, e->unknowns);
+  for (int k = 0; k < e->rotations; k += 3) {
+    const int32_t *i = e->rotation + k;
+    const double s[] = {m->s[i[0]], m->s[i[1]], m->s[i[2]]};
+    double p[4], M[4] = {0}, product[4], c = 1;
+    take_half(s, p);
+    for (int j = 1; j < 4; ++j) c += p[j] * p[j], m->s[i[j - 1]] = e->turning[i[j - 1]];
+    if (!e->inner_force) continue;
+    const double conjugate[] = {1, -p[1], -p[2], -p[3]};
+    for (int j = 0; j < 3; ++j) M[1 + j] = e->inner_force[i[j]] / (c * c);
+    for (int half = 0; half < 2; ++half) multiply_turns(conjugate, M, product), multiply_turns(product, p, M);
+    for (int j = 0; j < 3; ++j) e->inner_force[i[j]] = M[1 + j];
+  }
+}
+
 /* Compute the end of the step in the axes of the plane and the step of the nodes; check that no
  * node and no rigid part rotates further than allowed. */
 static int measure(time_loop *m)
@@ -280,6 +309,7 @@ static int measure(time_loop *m)
     turn_axes(e->turned, e->axes, m->x, -1);
   }
   for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
+  if (e->rotations) turn_with_nodes(m);
   for (int k = 0; k < m->rotations; k += m->axes) {
     double square = 0; /* of a vector in space */
     for (int j = 0; j < m->axes; ++j) {
@@ -397,20 +427,16 @@ static int solve_to(time_loop *m, double t1, double end)
   return fails(m, RAISED);
 }
 
-/* Moments of hinges in axes of the node at the end of the step; the unknowns are in axes at its begin,
- * and in statics their changes are not rotations. */
+/* Moments of hinges in axes of the node at the end of the step; the unknowns are in axes at its begin. */
 static void turn_moments(const moving_supports *p, double *s)
 {
   for (int k = 0; k < p->hinges; ++k) {
     const hinge_support *h = p->hinge + k;
-    const double x = s[h->axis] / 2, c = p->at_end ? 1 : (1 - x * x) / (1 + x * x);
-    const double y = p->at_end ? x : 2 * x / (1 + x * x), M = p->reactions[h->across[0]];
+    const double angle = p->at_end ? s[h->axis] : 2 * atan(s[h->axis] / 2), c = cos(angle), y = sin(angle);
+    const double M = p->reactions[h->across[0]];
     double *N = p->reactions + h->across[1];
     p->reactions[h->across[0]] = c * M + y * *N, *N = c * *N - y * M;
-    p->angle[k] += 2 * atan(x);
-    if (!p->at_end) continue;
-    s[h->axis] = 2 * atan(x);
-    if (h->about >= 0) p->reactions[h->about] *= 1 + x * x;
+    p->angle[k] += angle;
   }
 }
 
@@ -677,6 +703,8 @@ int repeat_steps(time_loop *m, int number, const double *steps, const double *co
     if (!find_rates(m, t1, end) || !set_step(m, t1, end) || !begin_terms(m)) return k;
     memcpy(e->unknowns, configurations + (size_t)k * m->size, m->size * sizeof *e->unknowns);
     turn_axes(e->turned, e->axes, e->unknowns, 1);
+    if (e->rotations) memcpy(e->base, m->q, m->size * sizeof *e->base);
+    find_turning(e, e->unknowns);
     restart(e, EXACT);
     /* Laws with several branches find their branch in the first residual. */
     for (int i = 0; i < 2; ++i) residual(e, e->unknowns, e->residual, e->f);

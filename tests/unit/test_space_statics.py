@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""Statics in space with large rotations in a step: roll-up, a bent arc, works, restart."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from test_space import OTHER, STIFF, bend
+
+import ufl_beam as ub
+
+SKEW = np.array([0.0, 0.6, 0.8])
+TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
+
+
+def statics(scene, dt=1.0, **more):
+    return ub.simulate(scene, ub.Static(), **({"t": (0, 1)} | more), dt=dt, progress=False)
+
+
+def rolled(turns, load=ub.PointLoad, cells=8, amplitude=lambda t: t):
+    """A cantilever that a moment about a skew axis rolls up."""
+    section = ub.Section(EA=1e6, GA=5e5, GA3=5e5, EI=1.0, EI2=1.0, GJ=1.0)
+    beam = ub.Beam((0, 0, 0), (1, 0, 0), section, cells=cells)
+    moment = load(beam.end, moment=tuple(2 * np.pi * turns * SKEW), amplitude=amplitude)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[moment])
+
+
+@pytest.mark.parametrize("load", [ub.PointLoad, ub.FollowerLoad])
+@pytest.mark.parametrize("steps", [1, 2, 3])
+@pytest.mark.parametrize("turns", [0.25, 0.5, 0.75, 1.0, 1.5, 2.0])
+def test_roll_up_of_any_number_of_turns(turns, steps, load):
+    """[closed] A polygon of equal angles, one step for each load step, and works M Ψ / 2.
+
+    The strains are linear in the load, so that two iterations find the step but for round-off.
+    """
+    n, scene = 8, rolled(turns, load)
+    run = statics(scene, 1 / steps)
+    assert run.substeps == steps
+    assert run.iterations <= 5 * steps
+    angles = 2 * np.pi * turns * (np.arange(n) + 0.5) / n
+    ahead = np.array([np.cos(angles).sum(), np.sin(angles).sum()]) / n
+    tip = run.position(scene.beams[0].end)[-1]
+    assert np.abs(tip - [ahead[0], *(ahead[1] * np.cross(SKEW, [1, 0, 0])[1:])]).max() < 1e-9
+    energy = (2 * np.pi * turns) ** 2 / 2
+    supplied = run.energy["loads"][-1]
+    assert np.allclose(supplied, energy, rtol=1e-9)
+    assert np.abs(run.energy.imbalance).max() < 1e-9 * energy
+
+
+def test_an_arc_bends_in_few_iterations():
+    """Load steps of 150 and 100 take at most 5 iterations, as many as a separate program takes."""
+    for steps in (4, 6):
+        run = statics(bend(8), 1 / steps)
+        assert run.substeps == steps
+        assert run.iterations <= 5 * steps
+    whole = statics(bend(8))  # the check of works divides this step
+    tips = [x.position(x.scene.beams[0].end)[-1] for x in (run, whole)]
+    assert np.abs(tips[0] - tips[1]).max() < 1e-7
+
+
+def frame(in_plane):
+    """A frame with a link, a driven root, a spring, and all loads that turn a node."""
+
+    def at(x, y):
+        return (x, y) if in_plane else tuple(TURN.apply([x, y, 0.0]))
+
+    axis = at(0, 0) if in_plane else tuple(TURN.apply([0.0, 0.0, 1.0]))
+    section = ub.Section(**STIFF, **({} if in_plane else OTHER))
+    up = {} if in_plane else {"up": at(0, 1)}
+    one = ub.Beam(at(0, 0), at(4, 1), section, cells=6, **up)
+    two = ub.Beam(at(4, 1), at(7, -1), section, cells=4, **up)
+    moment = 60.0 if in_plane else tuple(60.0 * np.array(axis))
+    turn = {} if in_plane else {"axis": axis}
+    held = {"u": 0, "v": 0} if in_plane else {"u": 0, "v": 0, "w": 0, "axis": axis}
+    loads = [
+        ub.FollowerLoad(two.end, force=at(0, 5), moment=moment, amplitude=lambda t: t),
+        ub.PointLoad(one.at(0.5), force=at(1, -2), moment=moment, amplitude=lambda t: t),
+    ]  # fmt: skip
+    return ub.Scene(
+        [one, two], joints=[ub.Rigid(one.end, two.start)], loads=loads,
+        supports=[ub.PrescribedDisplacement(one.start, psi=lambda t: 2.2 * t, **held)],
+        connectors=[ub.Turn(one.start, two.end, ub.Spring(30.0), **turn)],
+    )  # fmt: skip
+
+
+def test_large_planar_steps_are_the_same_in_space():
+    """To round-off in a turned plane, with a driven root, moments, a follower and a spring."""
+    plane, space = (statics(frame(x), 0.25, newton=ub.Newton(rtol=1e-13)) for x in (True, False))
+    for k, s in ((0, 0.5), (1, 1.0)):
+        a, b = (run.displacement(run.scene.beams[k].at(s)) for run in (plane, space))
+        back = TURN.inv().apply(b[:, :3])
+        assert np.abs(back[:, :2] - a[:, :2]).max() < 1e-11
+        assert np.abs(back[:, 2]).max() < 1e-11
+        wrapped = Rotation.from_rotvec(a[:, 2:] * [[0.0, 0.0, 1.0]]).as_rotvec()
+        assert np.abs(TURN.inv().apply(b[:, 3:]) - wrapped).max() < 1e-11
+    for name in plane.energy:
+        pair = [run.energy[name] for run in (plane, space)]
+        assert np.allclose(*pair, rtol=1e-10, atol=1e-10 * plane.energy.energy_transferred)
+    one, other = (run.reaction(run.scene.supports[0]) for run in (plane, space))
+    there = TURN.inv().apply(other.reshape(-1, 3)).reshape(other.shape)
+    assert np.allclose(there[1:, [0, 1, 5]], one[1:], rtol=1e-9, atol=1e-9)
+
+
+def test_works_are_of_second_order_and_ledgers_close():
+    """[order] The works of moments and forces of a skew motion; trapezoids."""
+    section = ub.Section(**STIFF, **OTHER)
+    beam = ub.Beam((0, 0, 0), (3, 1, 2), section, cells=6)
+    ball = ub.Body((3.5, 1, 2), mass=2.0, inertia=(0.3, 0.5, 0.4))
+    axis = (0.48, 0.6, 0.64)
+    scene = ub.Scene(
+        [beam], bodies=[ball], joints=[ub.Rigid(beam.end, ball.at(3, 1, 2))],
+        supports=[ub.PrescribedDisplacement(
+            beam.start, u=0, v=0, w=0, axis=axis, psi=lambda t: 3.0 * t)],
+        loads=[
+            ub.FollowerLoad(ball.middle, force=(9, -4, 7), moment=(90, 40, -30),
+                            amplitude=lambda t: t),
+        ],
+    )  # fmt: skip
+    errors, ends = [], []
+    for steps in (10, 20, 40):
+        run = statics(scene, 1 / steps)
+        errors.append(abs(run.energy.imbalance[-1] - run.energy.imbalance[0]))
+        ends.append(run.position(ball.middle)[-1])
+    assert errors[0] / errors[1] > 3.5
+    assert errors[1] / errors[2] > 3.5
+    assert np.abs(ends[0] - ends[2]).max() < 1e-7  # equilibria do not depend on steps
+
+
+def test_restart_between_large_rotations_changes_no_bit(tmp_path):
+    """A run by steps of more than half a turn: from a state, and from a checkpoint."""
+    scene = rolled(2.0, amplitude=lambda t: min(t, 1.0) + 0.1 * t)
+    whole = statics(scene, 1 / 3)
+    first = statics(scene, 1 / 3, t=(0, 2 / 3))
+    second = statics(first.scene, 1 / 3, t=(2 / 3, 1), start=first)
+    tip = scene.beams[0].end
+    assert (second.position(tip)[-1] == whole.position(tip)[-1]).all()
+    for end in (2 / 3, 1):  # the second run goes on from the file
+        again = statics(scene, 1 / 3, t=(0, end), checkpoint=ub.Checkpoint(tmp_path / "x", every=1))
+    assert (again.position(tip) == whole.position(tip)).all()
+    assert (again.energy["loads"] == whole.energy["loads"]).all()
+
+
+@pytest.mark.parametrize("steps", [1, 4])
+def test_a_free_hinge_turns_by_more_than_half_a_turn(steps):
+    """[closed] The angle is the moment about the axis over the stiffness, with all whole turns."""
+    section = ub.Section(EA=1e6, GA=5e5, GA3=5e5, EI=10.0, EI2=10.0, GJ=10.0)
+    beam = ub.Beam((0, 0, 0), (1, 0, 0), section, cells=4)
+    hinge = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=tuple(SKEW))
+    spring = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(2.0), axis=tuple(SKEW))
+    push = ub.PointLoad(beam.end, moment=tuple(9.0 * SKEW), amplitude=lambda t: t)
+    run = statics(ub.Scene([beam], supports=[hinge], connectors=[spring], loads=[push]), 1 / steps)
+    assert np.allclose(run.connector(spring).motion[-1], 4.5, rtol=1e-9)
+    wrapped = Rotation.from_rotvec(4.5 * SKEW).as_rotvec()
+    assert np.abs(run.displacement(beam.start)[-1] - [0, 0, 0, *wrapped]).max() < 1e-9
+    assert np.allclose(run.energy["loads"][-1], 9.0**2 / 2 * (1 / 2.0 + 1 / 10.0), rtol=1e-9)
+
+
+def test_a_pendulum_away_from_its_equilibrium_is_refused():
+    """As in the plane, with finite forces in the message."""
+    section = ub.Section(**{name: 1e3 * x for name, x in (STIFF | OTHER).items()})
+    beam = ub.Beam((0, 0, 0), (np.sin(0.1), 0, -np.cos(0.1)), section)
+    hinge = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=(0, 1, 0))
+    weight = ub.Gravity((0, 0, -9.81), amplitude=lambda t: t)
+    with pytest.raises(ub.ModelError, match="Begin near an equilibrium") as raised:
+        statics(ub.Scene([beam], supports=[hinge], loads=[weight]), 0.1)
+    assert "nan" not in str(raised.value)
+
+
+def test_options_of_petsc_and_the_reference_solver_find_the_same_arc():
+    options = None, ub.Newton(petsc={"snes_max_fail": 3}), ub.Newton(reference=True)
+    runs = [statics(bend(4), 0.125, newton=x) for x in options]
+    tips = [run.position(run.scene.beams[0].end)[-1] for run in runs]
+    assert np.abs(tips - tips[0]).max() < 1e-6
