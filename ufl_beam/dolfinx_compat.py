@@ -8,6 +8,7 @@ import os
 import shlex
 import sysconfig
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ def jit_directory() -> Path:
     return Path(_jit_options()["cache_dir"])
 
 
-def _jit_options() -> dict[str, Any]:
+def _jit_options(flags: Sequence[str] = ()) -> dict[str, Any]:
     try:
         options: dict[str, Any] = jit.get_options()
     except OSError as error:
@@ -93,13 +94,15 @@ def _jit_options() -> dict[str, Any]:
             f"DOLFINx cannot read its options in {error.filename}: {error.strerror}; set "
             "XDG_CONFIG_HOME to a directory that can be read"
         ) from None
-    flags = [*(options["cffi_extra_compile_args"] or []), *FLAGS]
-    return options | {"cffi_extra_compile_args": flags}
+    every = [*(options["cffi_extra_compile_args"] or []), *flags, *FLAGS]
+    return options | {"cffi_extra_compile_args": every}
 
 
-def compile_form(form: ufl.Form, directory: Path | None = None) -> fem.Form:
+def compile_form(
+    form: ufl.Form, directory: Path | None = None, flags: Sequence[str] = ()
+) -> fem.Form:
     """Compile a form with FFCx, or load it from the cache in ``directory``."""
-    return _compiled(fem.form, form, directory=directory)
+    return _compiled(fem.form, form, directory=directory, flags=flags)
 
 
 def compile_expression(value: Any, points: Array) -> fem.Expression:
@@ -107,11 +110,13 @@ def compile_expression(value: Any, points: Array) -> fem.Expression:
     return _compiled(fem.Expression, value, points)
 
 
-def _compiled(create: Any, *arguments: Any, directory: Path | None = None) -> Any:
+def _compiled(
+    create: Any, *arguments: Any, directory: Path | None = None, flags: Sequence[str] = ()
+) -> Any:
     logger = logging.getLogger()
     handlers, where = logger.handlers[:], {"cache_dir": directory} if directory else {}
     try:
-        return create(*arguments, jit_options=_jit_options() | where)
+        return create(*arguments, jit_options=_jit_options(flags) | where)
     finally:
         logger.handlers = handlers  # FFCx does not restore them after an interrupt
 

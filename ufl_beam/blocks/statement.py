@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, lru_cache
+from itertools import islice
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,9 @@ OF_STEP = ["dt", "fraction", "reached", *COEFFICIENTS]
 """Numbers of all steps: length (s); part of the changes of loads that is applied at the end of the
 step, and in its equation; and, for statements with rates, coefficients of the scheme."""
 
+
+MANY = 100
+"""Number of intermediate numbers above which sparse products are fewer than products in order."""
 
 FIRST_MODES = names("mode_of_block", "mode_")
 """Modes that C sets: "held", "fresh" and "stiffened", see loops.h."""
@@ -114,7 +118,6 @@ class Inputs(dict[str, Expr]):
         self.domain = compiler.values(1).mesh.ufl_domain()
         self.stages: list[tuple[Expr, Expr, Expr, Expr]] = []
         self.in_tangent: dict[Expr, Expr] = {}
-        self._known: dict[tuple[int, ...], list[list[Expr]]] = {}
 
     def stage(self, value: Any, slope_of: Any = None, in_tangent: Any = None) -> Expr:
         """Return a variable for an intermediate number, which is differentiated apart.
@@ -152,25 +155,34 @@ class Inputs(dict[str, Expr]):
         """Return the derivatives of expanded expressions by inputs: of the first one, ..."""
         return self.slopes_by(outputs, [self[name] for name in names])
 
-    def slopes_by(self, outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
-        """Return the derivatives of expanded expressions by variables: of the first one, ..."""
+    def slopes_by(self, outputs: Sequence[Expr], by: Sequence[Expr], unused: int = 0) -> list[Expr]:
+        """Return the derivatives of expanded expressions by variables: of the first one, ...
+
+        Intermediate numbers are eliminated one by one; if there are :data:`MANY`, next the one with
+        the fewest products, see A. Griewank and A. Walther, Evaluating Derivatives, 2008, chapter 9.
+        Derivatives of the first ``unused`` outputs by as many first variables are left out: zero.
+        """
         if not outputs or not by:
             return []
-        stages, n = [stage for stage, *_ in self.stages], len(by)
-        every, inner = _slopes(outputs, [*by, *stages]), self._slopes_of_stages(by)
-        rows = (every[i : i + n + len(stages)] for i in range(0, len(every), n + len(stages)))
-        return [x for row in rows for x in _chained(row[:n], row[n:], inner)]
-
-    def _slopes_of_stages(self, by: Sequence[Expr]) -> list[list[Expr]]:
-        """Return the derivatives of each intermediate number, which may depend on earlier ones."""
-        key, stages, n = tuple(map(id, by)), [stage for stage, *_ in self.stages], len(by)
-        if key not in self._known:
-            found = self._known[key] = list[list[Expr]]()
-            every = _slopes([x[2] for x in self.stages], [*by, *stages]) if stages else []
-            for k in range(len(stages)):
-                row = every[k * (n + len(stages)) : (k + 1) * (n + len(stages))]
-                found.append(_chained(row[:n], row[n : n + k], found))
-        return self._known[key]
+        stages, m, n = [stage for stage, *_ in self.stages], len(outputs), len(by)
+        every = iter(_slopes([*outputs, *(x[2] for x in self.stages)], [*by, *stages]))
+        rows = [dict(enumerate(islice(every, n + len(stages)))) for _ in range(m + len(stages))]
+        used = [unused * (i < unused) for i in range(len(rows))]  # first columns
+        rows = [
+            {j: x for j, x in row.items() if j >= first and not isinstance(x, Zero)}
+            for row, first in zip(rows, used, strict=True)
+        ]
+        left = [*range(len(stages))]
+        while left:
+            k = left[0]
+            if len(stages) > MANY:
+                k = min(left, key=lambda k: len(rows[m + k]) * sum(n + k in row for row in rows))
+            left.remove(k)
+            inner, rows[m + k] = rows[m + k], {}
+            for row, first in zip(rows, used, strict=True):
+                if (x := row.pop(n + k, None)) is not None:
+                    row.update((j, row.get(j, 0) + x * dx) for j, dx in inner.items() if j >= first)
+        return [row.get(j, Zero()) for row in rows[:m] for j in range(n)]
 
     def along(
         self, outputs: Sequence[Expr], names: Sequence[str], directions: Sequence[Expr]
@@ -480,14 +492,16 @@ class Kernels:
         self, at: Inputs, functions: Sequence[Sequence[Expr]], facts: Any = None, inserted: int = 0
     ) -> Stated:
         unknowns = len(self._statement.unknowns)
-        return Stated(at.compiler, functions, facts, at.values_of_stages, inserted, unknowns)
+        large = len(at.stages) > MANY and not inserted
+        return Stated(at.compiler, functions, facts, at.values_of_stages, inserted, unknowns, large)
 
     @cached_property
     def derivative(self) -> tuple[Any, int]:
         """Derivatives of forces, new state, shared numbers, strains and margins by all inputs.
 
         The rows of a function are the derivatives of one number; the margins follow.  The second
-        item is the number of margins.
+        item is the number of margins.  Derivatives of forces by the motions at the end of the step
+        are zero here: they are the tangent.
         """
 
         def state() -> Stated:
@@ -496,7 +510,8 @@ class Kernels:
             made, at = self._stated(statement.inputs)
             rows = with_shared_nodes(expanded([*made.forces, *self._states(made), *made.strains]))
             conditions = [*margins(rows), *expanded(made.margins)]
-            table = [*at.slopes([*rows, *conditions], names), *conditions]
+            by, unused = [at[name] for name in names], len(statement.unknowns)
+            table = [*at.slopes_by([*rows, *conditions], by, unused), *conditions]
             return self._as_stated(at, [table], len(conditions))
 
         (function,), conditions = self._compiled("derivative", state)
@@ -593,11 +608,3 @@ def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:
     rows = [ufl.diff(ufl.as_vector(row), x) for row, x in zip(some, by, strict=True)]
     whole = components(ufl.as_tensor(rows))
     return [x for i in range(len(outputs)) for x in whole[i :: len(outputs)]]
-
-
-def _chained(slopes: list[Expr], outer: list[Expr], inner: list[list[Expr]]) -> list[Expr]:
-    """Add to derivatives the products of those by, and of, intermediate numbers."""
-    for x, row in zip(outer, inner, strict=True):
-        if not isinstance(x, Zero):
-            slopes = [y + x * dx for y, dx in zip(slopes, row, strict=True)]
-    return slopes

@@ -148,15 +148,18 @@ def _imported(name: str, directory: Path) -> ModuleType:
     return module
 
 
-def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Return a form, which is compiled if it is not in the cache, and the path of its C code."""
+def compiled_form(form: ufl.Form, *flags: str) -> tuple[fem.Form, Path]:
+    """Return a form, which is compiled if it is not in the cache, and the path of its C code.
+
+    ``flags`` are further compiler flags.
+    """
 
     def build(directory: Path) -> fem.Form:
         with _explained("a form"):
-            return compile_form(form, directory)
+            return compile_form(form, directory, flags)
 
-    key = _digest(form_key(form))
-    loaded, directory = cached(f"form_{key}", build, partial(compile_form, form))
+    key = _digest(form_key(form), *flags)
+    loaded, directory = cached(f"form_{key}", build, partial(compile_form, form, flags=flags))
     return loaded, _code(directory, Path(loaded.module.__file__))
 
 

@@ -241,8 +241,9 @@ def point_loop(source: Path, kernel: int, sizes: Sizes) -> int | None:
 
 @cache
 def element_loops(
-    source: Path, kernels: tuple[tuple[int, Sizes], ...], inserted: int, unknowns: int
-) -> list[int | None]:
+    source: Path, kernels: tuple[tuple[int, Sizes], ...], inserted: int, unknowns: int,
+    large: bool = False,
+) -> list[int | None]:  # fmt: skip
     """Return the addresses of the SIMD loops of functions of elements, compiled as one form.
 
     The first ``inserted`` functions of cells add to a vector or a matrix; their first inputs are
@@ -250,6 +251,7 @@ def element_loops(
     """
     files = ["assembly_simd.c" if k < inserted else "elements_simd.c" for k in range(len(kernels))]
     flags = FLAGS if unknowns > OF_TWO_NODES else SCHEDULED
+    flags = [*flags, *["-O1", "-fno-schedule-insns"] * large]
     return _loops(files, source, kernels, flags, unknowns)
 
 

@@ -227,16 +227,20 @@ class Pointwise:
         ((address, sizes),) = _addressed(tabulators(form), [(len(outputs), len(self.at))])
         return ffi.cast("answer_loop *", point_loop(source, address, sizes) or 0)
 
-    def form_of(self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING) -> str:
+    def form_of(
+        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING,
+        flags: Sequence[str] = (),
+    ) -> str:  # fmt: skip
         """Compile functions as integrals of one form; return the name of its entry in the cache.
 
         Nodes that are keys of ``instead`` are replaced.
         """
-        return self._compiled(*functions, instead=instead)[1].parent.name
+        return self._compiled(*functions, instead=instead, flags=flags)[1].parent.name
 
     def _compiled(
-        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING
-    ) -> tuple[fem.Form, Path]:
+        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING,
+        flags: Sequence[str] = (),
+    ) -> tuple[fem.Form, Path]:  # fmt: skip
         """Return a form with the functions as integrals, and the C file that FFCx wrote."""
         every = [x for outputs in functions for x in outputs]
         shared, sizes = iter(with_shared_nodes(every, instead)), [*map(len, functions)]
@@ -244,7 +248,7 @@ class Pointwise:
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         values = ([*islice(shared, n), *[0] * (most - n)] for n in sizes)
         parts = (ufl.dot(ufl.as_vector(x), z) * dx(k) for k, x in enumerate(values))
-        form, source = compiled_form(sum(parts))
+        form, source = compiled_form(sum(parts), *flags)
         self._alive.append(form)
         return form, source
 
@@ -264,6 +268,7 @@ class Stated(NamedTuple):
         instead: Nodes that are replaced, and their values.
         inserted: Number of the first functions that add to a vector or a matrix.
         unknowns: Number of the first inputs of these that are unknowns.
+        large: True for long functions of few calls, which compilers optimize less.
     """
 
     compiler: Pointwise
@@ -272,6 +277,7 @@ class Stated(NamedTuple):
     instead: Mapping[Expr, Expr] = NOTHING
     inserted: int = 0
     unknowns: int = 0
+    large: bool = False
 
 
 def compiled_functions(key: str | None, state: Callable[[], Stated]) -> tuple[list[Any], Any]:
@@ -288,21 +294,22 @@ def compiled_functions(key: str | None, state: Callable[[], Stated]) -> tuple[li
         some = [*filter(None, made.functions)]
         return json.dumps(
             [
-                made.compiler.form_of(*some, instead=made.instead) if some else "",
+                made.compiler.form_of(*some, instead=made.instead, flags=["-O0"] * made.large)
+                if some else "",
                 [(len(outputs), len(made.compiler.at)) for outputs in made.functions],
-                made.facts, made.inserted, made.unknowns,
+                made.facts, made.inserted, made.unknowns, made.large,
             ]
         )  # fmt: skip
 
     text = remembered(f"functions_{key}", compile_now) if key else compile_now()
-    name, sizes, facts, inserted, unknowns = json.loads(text)
+    name, sizes, facts, inserted, unknowns, large = json.loads(text)
     if not name:
         return [None] * len(sizes), facts
     if not has_form(name):  # a clean-up has removed it
         compile_now()
     form, source = cached_form(name)
     kernels = _addressed(compiled := tabulators(form), [(m, n) for m, n in sizes if m])
-    loops = element_loops(source, kernels, inserted, unknowns)
+    loops = element_loops(source, kernels, inserted, unknowns, large)
     kinds, made = (("inserts", "tabulate_batch *"), ("several", "batch_function *")), list[Any]()
     for k, (one, loop, (_, (outputs, _))) in enumerate(zip(compiled, loops, kernels, strict=True)):
         made.append(struct("element_function", one=one, outputs=outputs))
