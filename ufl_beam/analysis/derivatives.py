@@ -40,6 +40,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, V, acts_at_end, has_inertia, order_of
 from ufl_beam.model.beams import Mesh
+from ufl_beam.model.functions import same_function
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import Block, Column, Columns
 from ufl_beam.parallel import progress_bar
@@ -247,6 +248,7 @@ class Case:
                 "docs/derivatives.md"
             )
         simulation: Simulation = self.create(scene, start=start)
+        fill(simulation.time_loop, adds_up=1)
         return simulation
 
     def _step(self, name: str, fraction: float) -> float:
@@ -393,6 +395,14 @@ class StepDerivatives:
         weights, size = beside.weights, simulation.subdomain.size
         P, rows = len(weights), beside.derivatives()
         equation, A = simulation.equation, simulation.equation.A
+        for k, support in enumerate(simulation.scene.supports):
+            here = support.moving.get(5)  # a rotation in space, which is no sum of unknowns
+            others = [x.scene.supports[k].moving.get(5) for some in beside.scenes for x in some]
+            if here is not None and not all(same_function(here, other) for other in others):
+                raise ArgumentError(
+                    f"differentiate: {support}: psi depends on a parameter; rotations of supports "
+                    "in space have no derivatives: use a Turn with PrescribedMotion and Revolute"
+                )
         scene = Neighbours(simulation, beside.scenes, weights, size, rows)
         self.terms, self.states = list[Any](), list[Array]()
         self.places = list[tuple[int, int, Callable[[Any], Array]]]()
@@ -620,6 +630,8 @@ class Derivatives:
             reactions[:, k, components] += change * self._reactions[:, p, at]
         if solution.scene.in_space:
             states[TURNS] = self._turns(p, change)
+        if any(support.axis is not None for support in solution.scene.supports):
+            return states  # moments of hinges turn with their places
         return states | {"reactions": reactions}
 
     def _turns(self, p: int, change: float) -> Array:

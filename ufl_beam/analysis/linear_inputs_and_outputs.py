@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, eye_array, vstack
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.cells_in_space import velocity_in_space
 from ufl_beam.discretization.dof_numbering import turned, values_at
 from ufl_beam.errors import ArgumentError, ArgumentTypeError, shorten
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, BodyPoint, Place, arm, node
@@ -24,7 +25,6 @@ from ufl_beam.output.section_forces import ForcesAlongCells
 from ufl_beam.output.state_rows import connector_indices, signs_on_second_place
 
 IMAGINARY = 1e-100  # imaginary change of a configuration; its square vanishes
-UNITS = ("m", "m", "rad")
 SECTION_FORCES = ("N", "V", "M")
 FORCE = ("x", "y", "moment")
 KINDS: Mapping[str, tuple[str, ...]] = {
@@ -37,6 +37,16 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     "reaction": FORCE,
 }
 """Components of the results of methods of :class:`Solution` that may be outputs."""
+
+DIRECTIONS = "u", "v", "w"
+IN_SPACE: Mapping[str, tuple[str, ...]] = {
+    "displacement": DIRECTIONS,
+    "velocity": DIRECTIONS,
+    "acceleration": DIRECTIONS,
+    "connector": KINDS["connector"],
+    "reaction": ("x", "y", "z"),
+}
+"""The same in space."""
 
 
 class Inputs:
@@ -119,7 +129,8 @@ class Inputs:
                 columns["motions"].append(axis[:, 0])
                 columns["prescribed"].append(np.zeros(size))
                 columns["read"].append(axis[:, 0])
-                self.prescribed_names.append(f"{COMPONENTS[c]} of {x} [{UNITS[c]}]")
+                unit = "m" if c < x.displacements else "rad"
+                self.prescribed_names.append(f"{x.names[c]} of {x} [{unit}]")
 
     def _enter_force(self, name: str, force: Array, in_cells: Array) -> None:
         self.force_names.append(name)
@@ -158,15 +169,20 @@ def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, li
                 )
         elif isinstance(x, Support):
             index_of(scene.supports, x, f"{what}: ")
-            if component is not None and component not in [*COMPONENTS]:
+            known = {name: c for c, name in enumerate(x.names) if not name.startswith("rotation")}
+            if x.displacements == 3 and x.axis is None:
+                del known["psi"]
+            if component is not None and component not in [*known]:
+                *most, last = map(repr, known)
                 raise ArgumentError(
-                    f"{what}: component {shorten(component)} must be 'u', 'v' or 'psi'"
+                    f"{what}: component {shorten(component)} must be {', '.join(most)} or {last}"
                 )
-            components = sorted(x.held) if component is None else [COMPONENTS.index(component)]
+            held = [c for c in known.values() if c in x.held]
+            components = held if component is None else [known[component]]
             for c in components:
                 if c not in x.held:
                     raise ArgumentError(
-                        f"{what}: {x} does not hold {COMPONENTS[c]}, so that it cannot move it; "
+                        f"{what}: {x} does not hold {component}, so that it cannot move it; "
                         "give a PrescribedDisplacement, or a load as an input"
                     )
         else:
@@ -245,12 +261,18 @@ class Outputs:
     # -- motions -------------------------------------------------------------------------------
 
     def _place_rows(self, place: AttachmentPoint) -> csr_array:
-        """Return rows of (u, v, ψ) of a place; (3, size)."""
-        numbering = self._small.numbering
+        """Return rows of (u, v, ψ) of a place, in space of (u, v, w); (3, size)."""
+        numbering, turns = self._small.numbering, self._small.turns
         rows = np.zeros((3, numbering.size))
+        if isinstance(place, BodyPoint) and node(place) is GROUND:
+            return csr_array(rows)
+        if self._scene.in_space:
+            body = isinstance(place, BodyPoint)
+            dofs = numbering.node(place) if body else numbering.dofs[numbering.weights(place)[0]]
+            each = (np.unique(dofs)[:, None] == np.arange(numbering.size)).astype(float)
+            moved = velocity_in_space(numbering, place, each, np.array([turns] * len(each)))
+            return csr_array(moved[:, :3].T @ each)
         if isinstance(place, BodyPoint):
-            if node(place) is GROUND:
-                return csr_array(rows)
             dofs = numbering.node(place)
             x, y = turned(arm(place), self._small.q[dofs[2:]])[0]
             rows[[0, 1, 2], dofs] = 1.0
@@ -267,8 +289,8 @@ class Outputs:
         per = ("", "/s", "/s2")[order]
         rows = self._place_rows(x)
         for c in components:
-            row = rows[[c]]
-            name = f"{before}{COMPONENTS[c]}{after} {x} [{UNITS[c]}{per}]"
+            row, unit = rows[[c]], "m" if c < self._small.numbering.displacements else "rad"
+            name = f"{before}{_kinds(self._scene)[kind][c]}{after} {x} [{unit}{per}]"
             self._enter(name, [row if k == order else None for k in range(3)], motion=row)
 
     _add_displacement = _add_velocity = _add_acceleration = _add_motion
@@ -322,16 +344,18 @@ class Outputs:
             self._enter(f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]", [rows[[c]], None, None])
 
     def _add_reaction(self, x: Any, components: Sequence[int], kind: str) -> None:
-        small, dofs = self._small, self._small.numbering.node(x.place)
+        small, dofs = self._small, self._small.numbering.node(x.place)[:3]  # in space forces only
+        held = [c for c in x.held if c < 3]
         matrices = small.condensed_tangent, small.condensed_damping, small.masses
         axes = small._axes[dofs][:, dofs].toarray()
         holds = np.zeros((3, 3))
-        holds[sorted(x.held), sorted(x.held)] = 1.0
+        holds[held, held] = 1.0
         to = csr_array(axes @ holds @ axes.T)
         rows = [to @ csr_array(matrix)[dofs] for matrix in matrices]
         direct = -(to @ self._inputs.condensed[dofs]).toarray()
+        names = _kinds(self._scene)[kind]
         for c in components:
-            name = f"{FORCE[c]} {x} [{('N', 'N', 'N m')[c]}]"
+            name = f"{names[c]} {x} [{'N m' if names[c] == 'moment' else 'N'}]"
             self._enter(name, [row[[c]] for row in rows], direct[c])
 
     # -- section forces ------------------------------------------------------------------------
@@ -383,14 +407,19 @@ OBJECTS: Mapping[str, type] = {
 """Classes of the objects of outputs other than motions."""
 
 
+def _kinds(scene: Scene) -> Mapping[str, tuple[str, ...]]:
+    return IN_SPACE if scene.in_space else KINDS
+
+
 def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, list[int]]:
-    if not isinstance(output, tuple) or len(output) not in (2, 3) or output[0] not in [*KINDS]:
+    kinds = _kinds(scene)
+    if not isinstance(output, tuple) or len(output) not in (2, 3) or output[0] not in [*kinds]:
         raise ArgumentTypeError(
             f"{what} = {shorten(output)} must be a tuple such as ('displacement', place, 'v'), "
-            f"which begins with {', '.join(map(repr, KINDS))}"
+            f"which{' in space' * scene.in_space} begins with {', '.join(map(repr, kinds))}"
         )
     kind, x, *rest = output
-    names = KINDS[kind]
+    names = kinds[kind]
     if rest and rest[0] not in [*names]:
         raise ArgumentError(
             f"{what}: component {shorten(rest[0])} must be one of {', '.join(map(repr, names))}"

@@ -54,7 +54,6 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.loads import Load
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.output.states import States
 from ufl_beam.simulation.initial_state import StateOf
 from ufl_beam.simulation.simulation import Simulation
@@ -74,7 +73,8 @@ class LinearModel(Rich):
     Attributes:
         scene: Model.
         unknowns: Place and component ("u", "v", "psi") of each unknown x, or the constraint and
-            "force".  At supports with turned axes, u and v are along and across the axis.
+            "force".  At supports with turned axes, u and v are along and across the axis.  In space
+            rotations are about axes of the node, or of the support.
         M: Mass; sparse, (n, n), symmetric; zero in rows of constraints.
         C: Symmetric part of the derivative of forces with respect to velocities: damping.
         G: Skew-symmetric part of this derivative: gyroscopic forces.
@@ -127,17 +127,18 @@ class LinearModel(Rich):
         """Place and component of each unknown."""
         numbering, small = self._small.numbering, self._small
         where: dict[int, tuple[Any, str]] = {}
+        names = numbering.names
         for body, dofs in zip(self.scene.rigid_bodies, numbering.dofs_of_bodies, strict=True):
-            where.update((int(d), (body.middle, c)) for d, c in zip(dofs, COMPONENTS, strict=True))
+            where.update((int(d), (body.middle, c)) for d, c in zip(dofs, names, strict=True))
         for beam in self.scene.beams:
             s, inner = numbering.parameters(beam), numbering.mesh.nodes[1:-1]
             between = s[:-1, None] + inner * np.diff(s)[:, None]
             at = np.append(np.column_stack([s[:-1], between]), s[-1])
             for place, node in zip(at, numbering.nodes_along(beam), strict=True):
-                dofs = zip(numbering.dofs[node], COMPONENTS, strict=True)
+                dofs = zip(numbering.dofs[node], names, strict=True)
                 where.update((int(d), (beam.at(float(place)), c)) for d, c in dofs)
         for place, node in numbering.beyond.items():
-            dofs = zip(numbering.dofs[node], COMPONENTS, strict=True)
+            dofs = zip(numbering.dofs[node], names, strict=True)
             where.update((int(d), (place, c)) for d, c in dofs)
         forces = zip(numbering.multipliers, self.scene.all_connectors, strict=True)
         where.update((int(d), (connector, "force")) for d, connector in forces)
@@ -434,7 +435,7 @@ class LinearModel(Rich):
             raise ArgumentError(
                 "state: run has no state; give simulation, or simulation.snapshot()"
             )
-        q = now.q[-1] - small.q
+        q = small.change_to(now)
         v = now.v[-1] if len(now.v) else np.zeros(len(q))
         read, P = self._motion.read, self._motion.P
         count = self._motion.states - len(read) - 2 * inputs.number_of_motions
@@ -539,13 +540,14 @@ def linearize(
             :class:`PrescribedForce` or :class:`Controller`: the change of its force (N, N m); a
             connector with a :class:`PrescribedMotion`: the acceleration of its motion; a support
             or ``(support, "u")``: the acceleration of one of the components "u", "v", "psi" that
-            it holds, by default of each.
+            it holds, by default of each; in space "u", "v", "w", and "psi" about an axis.
         outputs: Each is a tuple of the name of a method of :class:`Solution`, its argument, and
             optionally a component: ``("displacement", place)``, ``("velocity", place)``,
             ``("acceleration", place)`` with the components "u", "v", "psi";
             ``("section_forces_at", place)`` with "N", "V", "M"; ``("connector", connector)`` with
             "motion", "rate", "force"; ``("joint", joint)`` and ``("reaction", support)`` with "x",
-            "y", "moment".  Without a component, each component is an output.
+            "y", "moment".  Without a component, each component is an output.  In space, motions
+            have "u", "v", "w", reactions "x", "y", "z"; section forces and joints are no outputs.
         at: Solution of the same beams with equal joints, which ends in equilibrium at rest, or
             ``(solution, n)`` with such a state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
@@ -569,7 +571,6 @@ def linearize(
         [1.]
     """
     require_kind(scene, Scene, "linearize: scene")
-    scene.require_plane("linearize")
     at = require_state("linearize", scene, at, mesh)
     sequences = {"inputs": inputs, "outputs": outputs}
     for name, some in sequences.items():

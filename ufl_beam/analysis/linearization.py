@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +21,7 @@ from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.cell_functions import mass_forces, stress_forces
-from ufl_beam.discretization.cells_in_space import TURNS
+from ufl_beam.discretization.cells_in_space import TURNS, rotation_vectors, rotations_between
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_touching, warn_of_warping
@@ -35,6 +36,7 @@ from ufl_beam.model.constraint_checks import warn_of_held_motions
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.states import States
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.cell_forces import CellForces
@@ -305,20 +307,37 @@ class Linearization:
     def gaps(self) -> dict[str, float]:
         """Return gaps of constraints and prescribed motions by name; rad or size of the scene."""
         r, t = self._linearized(self.q)[0], self._simulation.t
-        gaps = dict[str, float]()
+        gaps, q = dict[str, float](), self.q.copy()
+        if self.scene.in_space:
+            self._set_rotations(q, rotation_vectors(self.turns))
         for connector, force in zip(
             self.scene.all_connectors, self.numbering.multipliers, strict=True
         ):
             if force not in self._laws:
                 gap = abs(r[force]) / self.lengths[self._motion_of(connector)]
                 gaps[str(connector)] = max(float(gap), gaps.get(str(connector), 0.0))
-        at = self._axes.T @ self.q
+        at = self._axes.T @ q
         for support in self.scene.supports:
             for component, motion in support.held.items():
                 dof = self.numbering.node(support.place)[component]
-                gap = abs(at[dof] - value_at(motion, t, support)) / self.lengths[dof]
+                gap = at[dof] - value_at(motion, t, support)
+                if component > 2:  # in space rotations are known up to full turns
+                    gap = math.remainder(gap, 2 * math.pi)
+                gap = abs(gap) / self.lengths[dof]
                 gaps[str(support)] = max(float(gap), gaps.get(str(support), 0.0))
         return gaps
+
+    def change_to(self, now: States) -> Array:
+        """Return the motion from the state to the last of some states; (size,)."""
+        q: Array = now.q[-1] - self.q
+        if self.scene.in_space:
+            self._set_rotations(q, rotations_between(self.turns, now.turns(-1)))
+        return q
+
+    def _set_rotations(self, q: Array, rotations: Array) -> None:
+        """Set rotations of nodes in space; (nodes, 3)."""
+        dofs = np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[: len(rotations)]
+        q[dofs[:, 3:]] = rotations
 
     def _motion_of(self, connector: Connector) -> int:
         """Return a degree of freedom with the unit of the motion of a connector."""
@@ -332,6 +351,8 @@ class Linearization:
         """
         residual, _ = self._linearized(self.q)
         cells = self._simulation.equation.cell_forces
+        if self.scene.in_space:  # section forces are no outputs there
+            return residual, np.zeros((9, len(self.numbering.cells)))
         cells.accept()
         return residual, cells(self.q, self.q)
 

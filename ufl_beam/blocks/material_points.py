@@ -191,11 +191,12 @@ class PointForms:
         }
 
     @cache  # noqa: B019 - forms are kept in a cache of their own
-    def table(self, shapes: bool) -> PointTable:
+    def table(self, shapes: bool, m: int) -> PointTable:
         """Derivatives of the resultants of a section by its strains and all numbers of a point.
 
         Args:
             shapes: Whether parameters change strains or weights of points, the shape of a section.
+            m: Number of strains of a section.
 
         Returns:
             An ``element_function`` of loops.h; names of its inputs; numbers of states, numbers,
@@ -209,16 +210,16 @@ class PointForms:
             softens, of_jump = self._softening is not None, ("traction", "jump", "opening")
             states = [*of_jump * softens, *prefixed("state", law.variables)]
             modes = [*FIXED, *strain, *before, *new, *(() if softens else of_jump)]
-            B = [f"B {a}{k}" for a in range(len(strain)) for k in range(3)]
+            B = [f"B {a}{k}" for a in range(len(strain)) for k in range(m)]
             numbers = [name for name in self._pointwise.at if name not in (*states, *modes)]
-            numbers += ["rest 0", "rest 1", "rest 2"]
+            numbers += [f"rest {k}" for k in range(m)]
             (numbers if shapes else modes).extend([*B, "weight"])
-            motions = [f"{e} {k}" for e in ("e1", "e0") for k in range(3)]
+            motions = [f"{e} {k}" for e in ("e1", "e0") for k in range(m)]
             compiler = Pointwise([*motions, *states, *numbers, *modes])
             at = Inputs(compiler, {name: ufl.variable(x) for name, x in compiler.at.items()})
             for e, own in (("e1", strain), ("e0", before)):
                 for a, name in enumerate(own):
-                    sums = sum(at[f"B {a}{k}"] * at[f"{e} {k}"] for k in range(3))
+                    sums = sum(at[f"B {a}{k}"] * at[f"{e} {k}"] for k in range(m))
                     at[name] = at.stage(at[name], sums)
             with traced(law):
                 stress = expanded(equations.stress(at))
@@ -239,7 +240,7 @@ class PointForms:
             resultants = [
                 at[f"rest {k}"] * ((1 - θ) * at[f"e0 {k}"] + θ * at[f"e1 {k}"])
                 + at["weight"] * sum(x * at[f"B {a}{k}"] for a, x in enumerate(σ))
-                for k in range(3)
+                for k in range(m)
             ]
             outputs = expanded([*resultants, *new_state, *conditions, *unknowns])
             inputs = [*motions, *states, *numbers, *["growth"] * softens, *new]
@@ -249,7 +250,7 @@ class PointForms:
                 [[*compiler.at], counts], at.values_of_stages,
             )  # fmt: skip
 
-        key = key_of("points", *self._arguments, shapes)
+        key = key_of("points", *self._arguments, shapes, m)
         (function,), (names, counts) = compiled_functions(key, state)
         return function, names, counts
 
@@ -377,7 +378,7 @@ class Points:
 
     def derivatives(self, neighbours: Neighbours) -> Any:
         """Return ``point_derivatives`` of loops.h for terms with ``points``."""
-        (cells, per_cell, _), P = self._storage.shape, len(neighbours)
+        (cells, per_cell, _), P, m = self._storage.shape, len(neighbours), self.r.shape[1]
 
         def shape_of(term: Any) -> Array:
             of = term.points._section_points
@@ -385,12 +386,12 @@ class Points:
 
         shape = shape_of(neighbours.term)
         shapes = neighbours.change(shape_of)
-        function, inputs, (states, numbers, unknowns, conditions) = self._forms.table(shapes)
-        n, columns = cells * per_cell, 6 + states + numbers
+        function, inputs, (states, numbers, unknowns, conditions) = self._forms.table(shapes, m)
+        n, columns = cells * per_cell, 2 * m + states + numbers
         place = {name: k for k, name in enumerate(self.names)}
         column = np.array([place.get(name, -1) for name in inputs], dtype=np.int32)
-        adjacent = slice(first := column[6], first + states)
-        of_w = column[(own := slice(6 + states, columns))][column[own] >= 0]
+        adjacent = slice(first := column[2 * m], first + states)
+        of_w = column[(own := slice(2 * m + states, columns))][column[own] >= 0]
 
         def numbers_of(term: Any) -> Array:
             points = term.points
@@ -412,9 +413,9 @@ class Points:
         w[:, given] = in_batches(np.tile(shape, (cells, 1)), BATCH)
         changes = np.ones((P, columns), dtype=np.int32)
         changes[:, own] = by_number.any(axis=(1, 3))
-        dofs = 3 * (np.arange(n)[:, None] // per_cell) + np.arange(3)
+        dofs = m * (np.arange(n)[:, None] // per_cell) + np.arange(m)
         block = struct(
-            "element_block", lanes=BATCH, elements=n, batches=batches, unknowns=3, states=states,
+            "element_block", lanes=BATCH, elements=n, batches=batches, unknowns=m, states=states,
             numbers=numbers, modes=len(inputs) - columns, width=len(inputs), w=w,
             acting=np.full(1, batches, dtype=np.int32), batch=np.arange(batches, dtype=np.int32),
             dofs=in_batches(dofs.astype(np.int32), BATCH),
@@ -430,9 +431,9 @@ class Points:
         c = struct(
             "point_derivatives", points=self.c, of=of, column=column, geometry=geometry,
             rest=inputs.index("rest 0"),
-            e0=neighbours.state(lambda term: term.points._e0), e1=np.zeros((P, cells, 3)),
-            r=np.zeros((cells, 3)), e0_bar=np.zeros((cells, 3)), e1_bar=np.zeros((cells, 3)),
-            r_bar=np.zeros((cells, 3)),
+            e0=neighbours.state(lambda term: term.points._e0), e1=np.zeros((P, cells, m)),
+            r=np.zeros((cells, m)), e0_bar=np.zeros((cells, m)), e1_bar=np.zeros((cells, m)),
+            r_bar=np.zeros((cells, m)),
         )  # fmt: skip
         self._derivatives = c
         return c

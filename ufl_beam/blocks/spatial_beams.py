@@ -90,6 +90,7 @@ class CellInSpace(InertiaInSpace):
     nodes = 2
     inserts = True
     functions = 0
+    degree = 1
 
     @property
     def modes(self) -> Sequence[str]:
@@ -224,6 +225,11 @@ class InelasticCellInSpace(CellInSpace):
     """Cell with material points, see :class:`~ufl_beam.blocks.beams.InelasticCell`."""
 
     @property
+    def numbers(self) -> list[str]:
+        """Shifts, and those of the base class."""
+        return [*(f"shift {k}" for k in range(6)), *super().numbers]
+
+    @property
     def modes(self) -> list[str]:
         """Resultants and their derivatives; in statics also predicted resultants."""
         names = {"predicted": 0 if self.rates else 6, "r": 6, "D": 36}
@@ -235,7 +241,7 @@ class InelasticCellInSpace(CellInSpace):
         """See the base class."""
         r = [
             at.stage(
-                at[f"r {k}"], sum(at[f"D {6 * k + l}"] * e1[l] for l in range(6)),
+                at[f"r {k}"], at[f"shift {k}"] + sum(at[f"D {6 * k + l}"] * e1[l] for l in range(6)),
                 in_tangent=at.get(f"predicted {k}"),
             )
             for k in range(6)
@@ -349,7 +355,9 @@ class InelasticCellsInSpace(InelasticCells):
         fields: Fields, scheme: Scheme, strains: Sequence[ImposedStrain], number: int
     ) -> tuple[Any, list[Array]]:
         """See the base class; the first points of a cell are with its rotary inertia."""
-        return InelasticCellInSpace(alike(scheme)), _geometry(fields, scheme, float(number == 0))
+        shifts = np.zeros((6, len(fields.order)))
+        geometry = _geometry(fields, scheme, float(number == 0))
+        return InelasticCellInSpace(alike(scheme)), [*shifts, *geometry]
 
 
 def viscosity_in_space(damping: KelvinVoigt, fields: Fields, setting: BlockSetting) -> Block:

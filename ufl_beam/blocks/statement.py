@@ -159,8 +159,9 @@ class Inputs(dict[str, Expr]):
         """Return the derivatives of expanded expressions by variables: of the first one, ...
 
         Intermediate numbers are eliminated one by one; if there are :data:`MANY`, next the one with
-        the fewest products, see A. Griewank and A. Walther, Evaluating Derivatives, 2008, chapter 9.
-        Derivatives of the first ``unused`` outputs by as many first variables are left out: zero.
+        the fewest products, see A. Griewank and A. Walther, Evaluating Derivatives, 2008, section
+        9.2.  Derivatives of the first ``unused`` outputs by as many first variables are left
+        out: they are zero.
         """
         if not outputs or not by:
             return []

@@ -100,10 +100,10 @@ static void find_direction(const block_derivatives *m, const derivatives *d, int
   for (int i = 0; i < steps; ++i) x[i] = now[from[i]];
 }
 
-/* Strain k of the points of element i, in an array of three strains of each section. A spring has one strain only. */
+/* Strain k of the points of element i, in an array of all strains of each section. A spring has one strain only. */
 static inline size_t strain_of(const block_derivatives *m, int i, int k)
 {
-  return (m->strains == 1 ? 3 : m->strains) * (size_t)i + k;
+  return (m->strains == 1 ? m->inner->points->strains : m->strains) * (size_t)i + k;
 }
 
 /* Row of the table of batch c. */
@@ -176,7 +176,7 @@ void accept_block_derivative(void *self, const derivatives *d)
       for (int i = 0; i < b->states && !d->initial; ++i) multiply_row(m, c, b->unknowns + i, p, 0, z + i * n);
       for (int i = 0; i < m->strains && !d->initial; ++i) {
         multiply_row(m, c, b->unknowns + b->states + b->shares + i, p, 0, sum);
-        for (int l = 0; l < elements_in(b, c); ++l) m->inner->e1[(size_t)p * 3 * m->inner->points->cells + strain_of(m, c * n + l, i)] = sum[l];
+        for (int l = 0; l < elements_in(b, c); ++l) m->inner->e1[(size_t)p * m->inner->points->strains * m->inner->points->cells + strain_of(m, c * n + l, i)] = sum[l];
       }
       for (int i = 0; i < b->shares; ++i) {
         if (d->initial && i < b->kept) continue;

@@ -826,6 +826,7 @@ typedef struct {
   double load_weight, at; /* load_weight: of the end of a step in load_time; at: see Step */
   int proportional;          /* whether substeps go in proportion to loads and motions at the end of the step */
   int rotations, axes, half_tangents, multipliers; /* axes: consecutive numbers of a rotation, 1 or 3 */
+  int adds_up; /* whether rotations in space are sums of all steps, as derivatives need them; see shorten_rotations */
   const int32_t *rotation, *half_tangent, *multiplier;
   double turn, largest_turn; /* largest rotation in the step; limit of it, infinite if there is none */
   int turns_from_velocities; /* whether these are differences from rotations with the velocities before the step */

@@ -6,7 +6,7 @@
 static derivatives of_sections(const point_derivatives *m, const derivatives *d)
 {
   derivatives inner = *d;
-  inner.size = 3 * m->points->cells, inner.q0 = m->e0, inner.q1 = m->e1;
+  inner.size = m->points->strains * m->points->cells, inner.q0 = m->e0, inner.q1 = m->e1;
   return inner;
 }
 
@@ -180,5 +180,5 @@ void transpose_points(const point_derivatives *m, adjoint *a)
 void finish_points(const point_derivatives *m, adjoint *a)
 {
   finish_block((void *)m->of, a);
-  add_products(a, 3 * (size_t)m->points->cells, m->e0_bar, m->e0);
+  add_products(a, m->points->strains * (size_t)m->points->cells, m->e0_bar, m->e0);
 }

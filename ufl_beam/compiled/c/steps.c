@@ -629,7 +629,7 @@ int accept_step(time_loop *m)
   const int accepted = accept_end(m);
   m->taken = 0;
   if (m->stages > 1) enter_stage(m->prediction, m->t, m->q);
-  if (m->axes == 3 && m->rates) shorten_rotations(m);
+  if (m->axes == 3 && m->rates && !m->adds_up) shorten_rotations(m);
   ++m->substeps;
   if (m->forces && !isinf(m->step.dt)) watch_forces(m->forces, m);
   for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, m->prediction->q_before, m->q);
