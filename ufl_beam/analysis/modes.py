@@ -472,7 +472,11 @@ def buckling(
     require_no_spin("buckling", small, at)
     warn_of_limits("buckling", small)
     if scene.in_space:
-        static = Simulation(scene, Static(), t0=t, start=at, mesh=mesh, comm=MPI.COMM_SELF)
+        t0 = 0.0 if at is None else float(at.times[-1])  # loads grow from their values there
+        static = Simulation(scene, Static(), t0=t0, start=at, mesh=mesh, comm=MPI.COMM_SELF)
+        for inner in (*(cells.points for cells in static.inelastic), *static.connector_terms):
+            inner.freeze()  # as in the linearized equations
+        static.time_loop.path.slack = math.inf  # frozen points do not store the work of steps
         with closing(static):
             found = small.buckling_in_space(n, static)
     else:
@@ -499,11 +503,13 @@ def buckling(
 
 def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Array], Array]:
     """Return the law and the resultants of the cells in the last state of ``at``, or without it."""
-    law, count = section_law(small.beams, small.numbering), len(small.numbering.cells)
+    count = len(small.numbering.cells)
     if small.scene.in_space:
         fields = Fields(Subdomain(small.numbering, MPI.COMM_SELF))
         D = fields.section_values(*STIFFNESS_IN_SPACE)[:, :, None] * np.eye(6)
         law = np.zeros((count, 6)), D.reshape(-1, 36)
+    else:
+        law = section_law(small.beams, small.numbering)
     return law, np.zeros((lib.CELL_NUMBERS, count)) if at is None else at.cell_resultants(-1)
 
 

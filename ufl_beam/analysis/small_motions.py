@@ -202,10 +202,10 @@ class SmallMotions(Linearization):
         equilibrium at each estimate of a factor.  The stiffness there, and its slope since the last
         estimate, yield the next estimate.  Errors are the last changes.
         """
-        (u, _), supports = self.linear_change("buckling"), static.supports
+        (u, _), supports, t = self.linear_change("buckling"), static.supports, self._simulation.t
 
         def stiffness(λ: float) -> csr_array:
-            step = Step(-math.inf, static.t, self.q, static.t, static.t, fraction=λ)
+            step = Step(-math.inf, t, self.q, t, t, fraction=λ)
             guess = supports.in_axes(self.q + λ * u)
             supports.move(guess, guess, step)
             q1 = static.attempt_along(step, guess, None).q1

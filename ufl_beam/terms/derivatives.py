@@ -291,8 +291,8 @@ def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:
         inner = list[tuple[Any, int]]()
         if data.inner:
             p = data.inner.points
-            inner = [(p.w, 8 * p.cells * p.of_cell * p.width), (p.e0, 24 * p.cells)]
-            inner.append((p.e1, 24 * p.cells))
+            strains = 8 * p.strains * p.cells
+            inner = [(p.w, 8 * p.cells * p.of_cell * p.width), (p.e0, strains), (p.e1, strains)]
             if p.damped:
                 c, first = p.damped, (2 + p.damped.rates) * p.damped.unknowns
                 tangents = (c.w + (k * c.width + first) * c.lanes for k in range(c.batches))
