@@ -265,7 +265,7 @@ def test_derivatives_of_a_yielding_planar_beam_in_a_turned_plane(scheme):
         whole = ub.differentiate(made, values, scheme, t=(0, 1), **options)
         first = ub.differentiate(made, values, scheme, t=(0, 0.5), **options)
         second = ub.differentiate(made, values, scheme, t=(0.5, 1), start=first, **options)
-        slopes += [x.of(lambda s: height(s)[-1]) for x in (whole, second)]  # noqa: B023
+        slopes += [x.of(lambda s: height(s)[-1]) for x in (whole, second)]
         slopes.append(
             ub.gradient(made, values, scheme, t=(0, 1), dt=0.05, of=height, newton=EXACT)[1]
         )

@@ -267,8 +267,10 @@ class Outputs:
         if isinstance(place, BodyPoint) and node(place) is GROUND:
             return csr_array(rows)
         if self._scene.in_space:
-            body = isinstance(place, BodyPoint)
-            dofs = numbering.node(place) if body else numbering.dofs[numbering.weights(place)[0]]
+            if isinstance(place, BodyPoint):
+                dofs = numbering.node(place)
+            else:
+                dofs = numbering.dofs[numbering.weights(place)[0]]
             each = (np.unique(dofs)[:, None] == np.arange(numbering.size)).astype(float)
             moved = velocity_in_space(numbering, place, each, np.array([turns] * len(each)))
             return csr_array(moved[:, :3].T @ each)

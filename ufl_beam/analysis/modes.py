@@ -507,7 +507,7 @@ def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Ar
     if small.scene.in_space:
         fields = Fields(Subdomain(small.numbering, MPI.COMM_SELF))
         D = fields.section_values(*STIFFNESS_IN_SPACE)[:, :, None] * np.eye(6)
-        law = np.zeros((count, 6)), D.reshape(-1, 36)
+        law: tuple[Array, Array] = np.zeros((count, 6)), D.reshape(-1, 36)
     else:
         law = section_law(small.beams, small.numbering)
     return law, np.zeros((lib.CELL_NUMBERS, count)) if at is None else at.cell_resultants(-1)

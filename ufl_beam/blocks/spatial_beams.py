@@ -239,13 +239,10 @@ class InelasticCellInSpace(CellInSpace):
         self, at: Inputs, e0: Vector, e1: Vector, predicted: Vector
     ) -> tuple[list[Expr], dict[str, Any]]:
         """See the base class."""
-        r = [
-            at.stage(
-                at[f"r {k}"], at[f"shift {k}"] + sum(at[f"D {6 * k + l}"] * e1[l] for l in range(6)),
-                in_tangent=at.get(f"predicted {k}"),
-            )
-            for k in range(6)
-        ]  # fmt: skip
+        r = list[Expr]()
+        for k in range(6):
+            linear = at[f"shift {k}"] + sum(at[f"D {6 * k + l}"] * e1[l] for l in range(6))
+            r.append(at.stage(at[f"r {k}"], linear, in_tangent=at.get(f"predicted {k}")))
         return r, {"strains": e1, "predicted": predicted}
 
 
