@@ -499,8 +499,9 @@ def buckling(
 
 def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Array], Array]:
     """Return the law and the resultants of the cells in the last state of ``at``, or without it."""
-    law, count = section_law(small.beams, small.numbering), len(small.numbering.cells)
-    if small.scene.in_space:
+    count, in_space = len(small.numbering.cells), small.scene.in_space
+    law = section_law([] if in_space else small.beams, small.numbering)
+    if in_space:
         fields = Fields(Subdomain(small.numbering, MPI.COMM_SELF))
         D = fields.section_values(*STIFFNESS_IN_SPACE)[:, :, None] * np.eye(6)
         law = np.zeros((count, 6)), D.reshape(-1, 36)
