@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import ufl_beam as ub
+from ufl_beam.model.bodies import BodyPoint
 
 STEPS = 8
 """Steps of a run."""
@@ -153,13 +154,17 @@ class _Writer:
             more["turning"] = True
         if kind == "Universal":
             more["axes"] = axis["axis"], self._in_axes(np.cross(vector, self._vector()))
+        if kind in ("Rigid", "Revolute", "Spherical", "Universal") and self._chance(0.2):
+            more["multipliers"] = True
         self._parts["joints"].append(getattr(ub, kind)(a, b, **more))
         if kind == "Revolute" and self._chance(0.5):
-            size, name = self._size(-2, 1), self._one(["hinge", "hardening", "friction"])
+            names = ["hinge", "hardening", "friction"] + ["rubbing"] * ("multipliers" in more)
+            size, name = self._size(-2, 1), self._one(names)
             law = {
                 "hinge": ub.RigidPlastic(ub.LinearSoftening(size, fracture_energy=size)),
                 "hardening": ub.RigidPlastic(ub.ElastoPlastic(size, kinematic=size)),
                 "friction": ub.Coulomb(size),
+                "rubbing": ub.Coulomb(coefficient=0.1, joint=self._parts["joints"][-1]),
             }[name]
             self.laws.append(name)
             self._parts["connectors"].append(ub.Turn(a, b, law, **axis))
@@ -265,6 +270,13 @@ class _Writer:
             "Turned": lambda: [ub.PrescribedDisplacement(
                 first.start, **hinge, psi=lambda t: rate * t * t)],
         }[support]()  # fmt: skip
+        if not free and not self._static and self._chance(0.2):  # one direction of another place
+            held, vector = self._anchor(), self._vector()
+            if np.any(held.point) and not isinstance(held.place, BodyPoint):
+                axes = {"along": self._in_axes(vector), "up": self._in_axes(np.roll(vector, 1))}
+                u = self._one([0.0, lambda t: 0.1 * t * t])
+                supports.append(ub.PrescribedDisplacement(held.place, u=u, **axes))
+                initial = []
         damping = [ub.KelvinVoigt(self._size(-3, -1))] if self._chance(0.15) else []
         self.laws += ["viscous"] * len(damping)
         loads = [] if free else self._loads()
