@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import shlex
+import sys
 import sysconfig
 import warnings
 from pathlib import Path
@@ -110,10 +111,13 @@ def compile_expression(value: Any, points: Array) -> fem.Expression:
 def _compiled(create: Any, *arguments: Any, directory: Path | None = None) -> Any:
     logger = logging.getLogger()
     handlers, where = logger.handlers[:], {"cache_dir": directory} if directory else {}
+    depth = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(depth, 10_000))  # UFL recurses over the terms of a sum
     try:
         return create(*arguments, jit_options=_jit_options() | where)
     finally:
         logger.handlers = handlers  # FFCx does not restore them after an interrupt
+        sys.setrecursionlimit(depth)
 
 
 def form_key(form: ufl.Form) -> str:

@@ -132,3 +132,30 @@ def test_viscosity_may_begin_with_start():
         ends.append(second.position(scene.beams[0].end))
     lengths = [np.linalg.norm(end, axis=1) for end in ends]
     assert np.abs(lengths[0] - lengths[1]).max() < 1e-11
+
+
+def bent(EI):
+    made = ub.Section(**{**STIFF, "EI": EI}, **OTHER)
+    return cantilever(made, skew, amplitude=lambda t: 20 * t)
+
+
+def test_derivatives_of_fourth_order_are_refused():
+    """Rotations turn by several Cayley vectors in a step, of which only the sum is kept."""
+    with pytest.raises(ub.ArgumentError, match="not of their stages; use EnergyMomentum"):
+        ub.differentiate(bent, {"EI": 500.0}, ub.EnergyMomentum(order=4), t=(0, 0.1), dt=0.02)
+
+
+@pytest.mark.slow
+def test_derivatives_with_decay():
+    """Tables have sums of some thousand terms; differences have errors of second order."""
+    scheme, h = ub.EnergyMomentumDecaying(), 0.03
+
+    def moved(s):
+        return s.displacement(s.scene.beams[0].end)
+
+    run = ub.differentiate(bent, {"EI": 500.0}, scheme, t=(0, 0.1), dt=0.02, **RUN)
+    ends = [
+        moved(ub.simulate(bent(500.0 + x), scheme, t=(0, 0.1), dt=0.02, **RUN)) for x in (h, -h)
+    ]
+    exact = (ends[0] - ends[1]) / (2 * h)
+    assert np.abs(run.of(moved)[..., 0] - exact).max() < (h / 500) * np.abs(exact).max()
