@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import shlex
+import sys
 import sysconfig
 import warnings
 from collections.abc import Sequence
@@ -115,10 +116,13 @@ def _compiled(
 ) -> Any:
     logger = logging.getLogger()
     handlers, where = logger.handlers[:], {"cache_dir": directory} if directory else {}
+    depth = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(depth, 10_000))  # UFL recurses over the terms of a sum
     try:
         return create(*arguments, jit_options=_jit_options(flags) | where)
     finally:
         logger.handlers = handlers  # FFCx does not restore them after an interrupt
+        sys.setrecursionlimit(depth)
 
 
 def form_key(form: ufl.Form) -> str:

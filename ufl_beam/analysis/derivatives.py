@@ -247,6 +247,12 @@ class Case:
                 "return the same Beam objects for the same values, by functools.cache, see "
                 "docs/derivatives.md"
             )
+        scheme, in_space = self.create.keywords["scheme"], scene.in_space
+        if in_space and self._call == "differentiate" and order_of(scheme) > 2:
+            raise ArgumentError(
+                f"differentiate: {scheme!r}: derivatives of rotations in space are known at ends "
+                "of steps, not of their stages; use EnergyMomentum() of second order"
+            )
         simulation: Simulation = self.create(scene, start=start)
         fill(simulation.time_loop, adds_up=1)
         return simulation

@@ -91,8 +91,9 @@ class SmallMotions(Linearization):
         """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""
         right, left = self._with_laws()
         works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
-        sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
-        return works, np.asarray(np.abs(works) <= ZERO * sizes)
+        sizes = ZERO * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
+        sizes += ROUND_OFF**2 * self.squares.max() * np.sum(x * (self.M @ x), axis=0)  # of x
+        return works, np.asarray(np.abs(works) <= sizes)
 
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Compute at least n exponents and motions with velocity-dependent forces C.

@@ -450,6 +450,11 @@ class InelasticCells(BeamCells):
             self.prediction.exact = exact
         self._latest[:] = np.nan
 
+    def each_element(self, q: Array) -> Iterator[tuple[Index, Array, Array, Array]]:
+        """See the base class."""
+        self._about(q)
+        yield from super().each_element(q)
+
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """See the base class."""
         self._about(q1)

@@ -255,15 +255,15 @@ class Block(LoadTerm):
         This is the plain loop of the reference solver: one call of a kernel for an element.  The
         branches of laws are those of the latest residual.
         """
-        made, unknowns = self._kernels, len(self.statement.unknowns)
+        made, unknowns, modes = self._kernels, len(self.statement.unknowns), self.statement.modes
         entries = np.array(made.entries, dtype=int).reshape(-1, 2)
         all_dofs = np.reshape(self._elements.dofs, (-1, unknowns))
         inputs: list[Array] = [*np.ascontiguousarray(self.by_element(self._w))]
         for dofs, w in zip(all_dofs, inputs, strict=True):
             w[:unknowns] = q[dofs]
-            if self.statement.inserts and self.statement.modes:  # the latest tangent is at q
+            if "moved" in modes:  # the latest tangent is at q
                 about = [*q[dofs], 1.0, 1.0, *q[dofs]]
-                w[-len(self.statement.modes) :][: len(about)] = about
+                w[-len(modes) :][: len(about)] = about
             forces = called(made.force, w)[:unknowns]
             yield dofs, forces, entries, called(made.tangent, w)
 

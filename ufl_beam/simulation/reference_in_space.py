@@ -77,6 +77,7 @@ class ReferenceInSpace(Simulation):
     def _solve(self, t1: float, end: float) -> Array:
         """Return the configuration at the end of a step."""
         equation, last_dt = self.equation, float(self.prediction.c.dt)
+        self._evaluate_controllers()
         equation.begin(Step.create(self.scheme, self.t, t1, end, self.q))
         x = self.q + (t1 - self.t) / last_dt * (self.q - self.q_before)
         scales = self.numbering.scales

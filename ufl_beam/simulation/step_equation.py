@@ -264,6 +264,7 @@ class StepEquation:
         archive = Archive(self.subdomain, internal)
         self.controllers.save_or_restore(archive, t)
         given = {*self.nodes_in_space} if TURNS in internal else set()
+        given |= {x for x in self.remembering if x.kind == "damping" and not same}  # in space
         for term in (x for x in self.remembering if x not in given):
             term.save_or_restore(archive, q if term in self.nodes_in_space else NOWHERE)
         for cells in () if same else self.in_space:

@@ -51,7 +51,7 @@ class Supports:
         self.motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in subdomain.numbering.scene.rigid_bodies:
             constrained.extend(subdomain.local(subdomain.numbering.node(GROUND.middle)))
-        self._fixed = list[int]()
+        self._fixed, self._near = list[int](), 1e-9 * subdomain.numbering.scene.size
         free, driven = list[tuple[Support, Index]](), list[tuple[Support, Index]]()
         of_hinges = list[tuple[int, TimeFunction, Support]]()
         for support in subdomain.numbering.scene.supports:
@@ -130,7 +130,7 @@ class Supports:
             moving=len(moves), dof=self.moving.astype(np.int32),
             motion=callbacks.time_functions(moves), reactions=self.reactions,
             before=self._before, work=entry, weight_of_before=self._scheme.weight_of_before,
-            fixed=len(self._fixed), fix=np.array(self._fixed, dtype=np.int32),
+            fixed=len(self._fixed), fix=np.array(self._fixed, dtype=np.int32), near=self._near,
             hinges=len(hinges), driven=self._driven, at_end=acts_at_end(self._scheme),
             hinge=ffi.new("hinge_support[]", hinges), angle=self.angles,
         )  # fmt: skip

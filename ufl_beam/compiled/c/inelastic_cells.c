@@ -113,6 +113,7 @@ void respond_at(const inelastic *m, const double *q)
 void put_tangents(const inelastic *m)
 {
   put_modes(m, m->at_D, m->points->strains * m->points->strains, m->points->D);
+  put_modes(m, m->at_predicted, m->points->strains, m->points->r);
 }
 
 void add_inelastic_force(void *self, const double *q, double *r)
@@ -129,7 +130,7 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   points *p = m->points;
   respond_at(m, q);
   put_tangents(m);
-  put_modes(m, m->at_predicted, p->strains, b->predicted ? predict_forces(m, q) : p->r);
+  if (b->predicted) put_modes(m, m->at_predicted, p->strains, predict_forces(m, q));
   add_cells((void *)b->inserted, q, tangent);
   if (b->predicted) {
     take_tangent(m);

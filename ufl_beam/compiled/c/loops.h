@@ -739,7 +739,7 @@ typedef struct {
   const time_function *motion;
   double *reactions;
   double *before, *work; /* work: entry of the ledger */
-  double weight_of_before;
+  double weight_of_before, near; /* near: a smaller displacement of a fixed place is round-off; m */
   /* driven: hinges with prescribed rotations, the last motions; at_end: whether the equation of a step
    * holds at its end */
   int hinges, driven, at_end, fixed;

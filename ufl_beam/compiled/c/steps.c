@@ -139,7 +139,8 @@ static int guess(time_loop *m)
   else if (far > FARTHEST) memcpy(m->guess, q, m->size * sizeof *q);
   else predict(m->prediction, m->step.dt, q, m->guess);
   turn_axes(e->turned, e->axes, m->guess, 1);
-  for (int k = 0; k < p->fixed; ++k) m->guess[p->fix[k]] = 0;
+  for (int k = 0; k < p->fixed; ++k)
+    if (fabs(m->guess[p->fix[k]]) < p->near) m->guess[p->fix[k]] = 0;
   if ((p->moving || p->hinges) && e->turned) {
     memcpy(e->plane, q, m->size * sizeof *q);
     turn_axes(e->turned, e->axes, e->plane, 1);
