@@ -111,6 +111,7 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
 	@./env python3 benchmarks/bench_ensemble.py
+	@./env python3 benchmarks/bench_space.py
 
 bench-test: ## tests of the benchmarks
 	@./env python3 -m pytest -q benchmarks/tests

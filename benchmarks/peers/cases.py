@@ -36,7 +36,7 @@ NEWTON = ("full", "modified")
 DENSE = 64
 """Exudyn's dense solver is tried up to this number of cells."""
 FEW = {512: 50, 4096: 5}
-"""Steps of OpenSees in the flying beam, which would take minutes."""
+"""Steps of OpenSees in the flying and the tumbling beam, which would take minutes."""
 FINE = 10_000
 """With more cells OpenSees takes the first steps of the roll-up only, if it can."""
 SWING = {"end": 1.2}
@@ -57,6 +57,13 @@ def exudyn(cells, newton=NEWTON, said="", **more):
         for one in newton:
             how = {"newton": one, "solver": solver}
             yield "exudyn", f"{one} Newton, {solver}{said}", how | more
+
+
+IN_SPACE = (  # nodes of Exudyn and its integrator
+    ("", {"node": "Euler parameters", "rho": 1.0}),
+    (", trapezoidal", {"node": "Euler parameters", "rho": "trapezoidal"}),
+    (", Lie group", {"node": "Lie group", "rho": 1.0}),
+)
 
 
 def opensees(*variants):
@@ -107,6 +114,20 @@ def cantilever(cells, dt):
     yield from floor()
 
 
+def tumbling_beam(cells, dt):
+    yield from ours(CONSERVING)
+    few = {"steps": FEW[cells]} if cells in FEW else {}
+    for said, how in IN_SPACE:
+        for newton in NEWTON if said == "" else ("modified",):
+            fewer = few if newton == "full" else {}
+            how_ = {"newton": newton, "solver": "sparse", **how, **fewer}
+            yield "exudyn", f"{newton} Newton, sparse{said}", how_
+    yield from opensees(("Newmark, constant inertia", few))
+    if dt < 0.05:  # it diverges with longer steps
+        fewer = {} if cells < DENSE else {"steps": FEW[512]}
+        yield from opensees(("Newmark, masses on arms", {"arms": True, **fewer}))
+
+
 TABLES = (  # problem, variants, arguments, and which of them --quick leaves out
     ("P1", roll_up, [{"cells": n, "turns": 0.5} for n in (8, 64, 512)], (512,)),
     ("P1", roll_up, [{"cells": 64, "turns": 1.0}], (64,)),
@@ -116,6 +137,8 @@ TABLES = (  # problem, variants, arguments, and which of them --quick leaves out
     ("P3", swing, [{"cells": n, "dt": 1e-3} for n in (8, 32, 128)], (32, 128)),
     ("P4", portal, [{"cells": n, "dt": 1e-3} for n in (12, 48)], ()),
     ("P5", cantilever, [{"cells": n, "dt": 1e-3} for n in (10_000, 100_000)], (100_000,)),
+    ("P6", tumbling_beam, [{"cells": n, "dt": 0.01} for n in (8, 64, 512)], (512,)),
+    ("P6", tumbling_beam, [{"cells": n, "dt": 0.05} for n in (8, 64)], (64,)),
 )
 
 
@@ -146,6 +169,18 @@ def portal_ladder(cells, dt):
     yield from opensees(
         ("with shear", {"element": "shear"}), ("without shear", {"element": "euler"})
     )
+
+
+def tumbling_ladder(cells, dt):
+    yield from ours(CONSERVING)
+    for said, how in IN_SPACE:
+        yield (
+            "exudyn", f"modified Newton{said}", {"newton": "modified", "solver": "sparse", **how}
+        )  # fmt: skip
+
+
+def arms_ladder(cells, dt):
+    yield from opensees(("masses on arms", {"arms": True}))
 
 
 def smooth(scheme, said="", **dials):
@@ -179,6 +214,10 @@ LADDERS = (  # problem, variants, what is common, cells for each step
     ("P4", smooth("EnergyMomentum", ", lumped", lumped=True), {}, {
         2e-2: (6,), 1e-2: (6, 12), 4e-3: (6, 12), 2e-3: (12,),
     }),
+    ("P6", tumbling_ladder, {}, {
+        0.2: (8, 16), 0.1: (8, 16, 32), 0.05: (16, 32), 0.025: (32, 64), 0.0125: (64, 128),
+    }),
+    ("P6", arms_ladder, {}, {0.02: (8, 16), 0.01: (16, 32)}),
 )  # fmt: skip
 
 

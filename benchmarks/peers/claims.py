@@ -186,7 +186,11 @@ def claims(records):
             lines.append(faster(records, line, "P4", of(program), cells=n))
     for n in (12, 48):
         lines.append(same_residual(records, f"portal, {n} cells, residual displacement", n))
-    for problem, line in (("P2", "flying beam"), ("P3", "swing"), ("P4", "portal")):
+    for n in (8, 64, 512):
+        lines.append(faster(records, f"tumbling beam, {n} cells", "P6", anyone, cells=n, **fly))
+    for problem, line in (
+        ("P2", "flying beam"), ("P3", "swing"), ("P4", "portal"), ("P6", "tumbling beam"),
+    ):  # fmt: skip
         for program in PEERS:
             line_ = f"{line}, error at equal time, {program}"
             lines.append(more_exact(records, line_, problem, program))

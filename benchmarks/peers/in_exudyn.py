@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The problems in Exudyn: planar geometrically exact beams, no output, the fastest settings.
+"""The problems in Exudyn: geometrically exact beams, no output, the fastest settings.
 
 Loads are symbolic functions, which Exudyn evaluates without Python.
 """
@@ -25,32 +25,42 @@ SOLVERS = {
     "dense": exu.LinearSolverType.EXUdense,
 }
 DISPLACEMENT, COORDINATES = exu.OutputVariableType.Displacement, exu.OutputVariableType.Coordinates
+NODES = {  # in space: kind, and rotation by an angle about z
+    "Euler parameters": (item.NodeRigidBodyEP, lambda a: [np.cos(a / 2), 0, 0, np.sin(a / 2)]),
+    "Lie group": (item.NodeRigidBodyRotVecLG, lambda a: [0, 0, a]),
+}
 real, least, most = exu.symbolic.Real, exu.symbolic.min, exu.symbolic.max
 
 
 class Model:
     """A system, and the nodes of its chains."""
 
-    def __init__(self, chains):
+    def __init__(self, chains, node=None):
         self.container = exu.SystemContainer()
         self.system = self.container.AddSystem()
         self.ground = self.coordinate(self.system.AddNode(item.NodePointGround()), 0)
+        self.node, self.beams, self._kept = node, [], []
         self.nodes = [self._add(chain) for chain in chains]
-        self._kept = []
 
     def _add(self, chain):
         add, s = self.system, chain.section
-        nodes = [
-            add.AddNode(item.NodeRigidBody2D(referenceCoordinates=[x, y, chain.angle]))
-            for x, y in chain.points
-        ]
+        if self.node is None:
+            kind, turn, beam = item.NodeRigidBody2D, [chain.angle], item.Beam2D
+            of_section = {
+                "massPerLength": s.rhoA, "crossSectionInertia": s.rhoI, "bendingStiffness": s.EI,
+                "axialStiffness": s.EA, "shearStiffness": s.GA,
+            }  # fmt: skip
+        else:  # the chain lies in the plane of x and y
+            (kind, turn), beam = NODES[self.node], item.Beam3D
+            section = exu.BeamSection()
+            section.stiffnessMatrix = np.diag([s.EA, s.GA, s.GA3, s.GJ, s.EI2, s.EI])
+            section.inertia = np.diag([s.rhoI + s.rhoI2, s.rhoI2, s.rhoI])
+            section.massPerLength = s.rhoA
+            turn, of_section = turn(chain.angle), {"sectionData": section}
+        nodes = [add.AddNode(kind(referenceCoordinates=[*p, *turn])) for p in chain.points]
         for pair in pairwise(nodes):
-            beam = item.ObjectBeamGeometricallyExact2D(
-                nodeNumbers=list(pair), length=chain.h, massPerLength=s.rhoA,
-                crossSectionInertia=s.rhoI, bendingStiffness=s.EI, axialStiffness=s.EA,
-                shearStiffness=s.GA,
-            )  # fmt: skip
-            add.AddObject(beam)
+            cell = beam(nodeNumbers=list(pair), length=chain.h, **of_section)
+            self.beams.append(add.AddObject(cell))
         return nodes
 
     def coordinate(self, node, c):
@@ -64,12 +74,12 @@ class Model:
             self.system.AddObject(item.CoordinateConstraint(markerNumbers=pair))
 
     def load(self, node, force, moment=None):
-        """Symbolic functions of time: a force (x, y), and a moment."""
+        """Symbolic functions of time: a force (x, y) or (x, y, z), and a moment (x, y, z)."""
         zero = real(0.0)
         marker = self.system.AddMarker(item.MarkerNodeRigid(nodeNumber=node))
-        made = [(item.LoadForceVector, lambda m, t, v: [*force(t), zero])]
+        made = [(item.LoadForceVector, lambda m, t, v: [*force(t), zero][:3])]
         if moment is not None:
-            made.append((item.LoadTorqueVector, lambda m, t, v: [zero, zero, moment(t)]))
+            made.append((item.LoadTorqueVector, lambda m, t, v: moment(t)))
         for kind, function in made:
             load = self.system.AddLoad(kind(markerNumber=marker, loadVector=[0, 0, 0]))
             self.function(self.system.SetLoadParameter, function, "loadVectorUserFunction", load)
@@ -85,7 +95,8 @@ class Model:
         )
 
     def where(self, node):
-        return self.system.GetNodeOutput(node, exu.OutputVariableType.Position)[:2].tolist()
+        position = self.system.GetNodeOutput(node, exu.OutputVariableType.Position)
+        return position[: 3 if self.node else 2].tolist()
 
     def history(self, sensor, column):
         """All but the initial value, one a period."""
@@ -168,7 +179,12 @@ def flying_beam(cells, dt, newton, solver, steps=None, rho=1.0, pulse="sudden"):
         on = most(real(0.0), least(real(1.0), (p.until - t) * (500 / dt) + 0.5))
         return on + 0.5 * most(real(0.0), 1.0 - exu.symbolic.abs(t - dt) * (1000 / dt))
 
-    model.load(nodes[0], lambda t: [p.force * factor(t), real(0.0)], lambda t: p.moment * factor(t))
+    zero = real(0.0)
+    model.load(
+        nodes[0],
+        lambda t: [p.force * factor(t), zero],
+        lambda t: [zero, zero, p.moment * factor(t)],
+    )
     model.system.Assemble()
     s = settings(newton, solver)
     integrator(s, rho)
@@ -272,4 +288,33 @@ def cantilever(cells, dt, newton, solver):
     return result | {"values": {"tip": model.where(nodes[-1])}}
 
 
-RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}
+def tumbling_beam(cells, dt, newton, solver, node, steps=None, rho=1.0):
+    p = PROBLEMS["P6"]
+    model = Model(p.chains(cells), node)
+    (nodes,) = model.nodes
+    slope = 2 * p.peak / p.until
+
+    def load(vector):
+        return lambda t: [most(real(0.0), least(t, p.until - t)) * (slope * v) for v in vector]
+
+    model.load(nodes[0], load(p.force), load(p.moment))
+    parts = exu.OutputVariableType.KineticEnergy, exu.OutputVariableType.PotentialEnergy
+    energies = [
+        model.sense(item.SensorBody, part, bodyNumber=beam)
+        for beam in model.beams
+        for part in parts
+    ]
+    model.system.Assemble()
+    s = settings(newton, solver, sampled=p.until)
+    integrator(s, rho)
+    n = steps or round(p.end / dt)
+    result = run(model, s, n * dt, n)
+    ends = [model.where(nodes[i]) for i in (0, -1)]
+    energy = np.sum([model.history(sensor, 1) for sensor in energies], axis=0).tolist()
+    return result | {"values": {"ends": ends, "energy": energy}}
+
+
+RUNS = {
+    "P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever,
+    "P6": tumbling_beam,
+}  # fmt: skip

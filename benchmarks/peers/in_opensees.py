@@ -2,7 +2,8 @@
 """The problems in OpenSees: corotational elements, lumped masses, no output.
 
 Its planar corotational transformation ends at a rotation of π; where beams turn further (P2), a
-spatial model has its motion out of the plane fixed.
+spatial model has its motion out of the plane fixed.  Masses are constants in the axes of the scene,
+also rotary ones; inertia that turns with a spatial beam (P6) are masses on stiff arms.
 """
 
 import math
@@ -17,14 +18,15 @@ VERSION = f"OpenSees {ops.version()}"
 
 
 class Model:
-    """Nodes and elements; ``spatial`` has six degrees of freedom a node, of which three are fixed.
+    """Nodes and elements; ``spatial`` has six degrees of freedom a node, of which three are fixed
+    unless it is ``free``.
 
     Element "euler" is elasticBeamColumn, without shear; "shear" is ElasticTimoshenkoBeam.
     """
 
-    def __init__(self, element, spatial=False):
+    def __init__(self, element, spatial=False, free=False):
         ops.wipe()
-        self.element, self.spatial = element, spatial
+        self.element, self.spatial, self.free = element, spatial, free
         self.turn = 6 if spatial else 3
         ops.model("basic", "-ndm", 3 if spatial else 2, "-ndf", self.turn)
         self.count, self.elements, self.masses, self.fixed = 0, 0, {}, {}
@@ -52,9 +54,34 @@ class Model:
         more = (1.0, 1.0, s.EI, s.EI, s.EI) if self.spatial else (1.0, s.EI)
         return "elasticBeamColumn", *place, s.EA, *more, transformation
 
-    def node(self, x, y):
+    def put_on_arms(self, tags, chain):
+        """Masses of a chain on four stiff arms a node, for inertia that turns with the nodes."""
+        s, up = chain.section, np.array((0.0, 0.0, 1.0))
+        along = np.subtract(chain.end, chain.start) / (chain.cells * chain.h)
+        arms = math.sqrt(2 * s.rhoI / s.rhoA) * np.array([up, np.cross(up, along)])
+        self.elements += 1
+        transformation = self.elements
+        ops.geomTransf("Corotational", transformation, *along)
+        for tag, point in zip(tags, chain.points, strict=True):
+            m, _ = self.masses.pop(tag)
+            for arm in (*arms, *-arms):
+                end = self.node(*point + arm)
+                self.masses[end] = m / 4, 0.0
+                self.elements += 1
+                ops.element(*self._element(tag, end, s.times(1e3), transformation))
+
+    def energy(self):
+        """Kinetic, and stored in elements of linear elasticity without shear; J."""
+        kinetic = 0.0
+        for tag, (m, J) in self.masses.items():
+            v = np.array(ops.nodeVel(tag))
+            kinetic += (m * v[:3] @ v[:3] + J * v[3:] @ v[3:]) / 2
+        stored = (np.dot(ops.basicForce(e), ops.basicDeformation(e)) for e in ops.getEleTags())
+        return float(kinetic + sum(stored) / 2)
+
+    def node(self, x, y, z=0.0):
         self.count += 1
-        ops.node(self.count, float(x), float(y), *([0.0] if self.spatial else []))
+        ops.node(self.count, float(x), float(y), *([float(z)] if self.spatial else []))
         return self.count
 
     def fix(self, tag, u, v, turn):
@@ -64,17 +91,19 @@ class Model:
         """Supports and masses, which the chains of a node share."""
         for tag in range(1, self.count + 1):
             u, v, turn = self.fixed.get(tag, (0, 0, 0))
-            ops.fix(tag, u, v, *((1, 1, 1) if self.spatial else ()), turn)
+            ops.fix(tag, u, v, *([int(not self.free)] * 3 if self.spatial else ()), turn)
             m, J = self.masses.get(tag, (0.0, 0.0))
             ops.mass(tag, *((m, m, m, J, J, J) if self.spatial else (m, m, J)))
 
-    def load(self, tag, series, fx=0.0, fy=0.0, moment=0.0):
+    def load(self, tag, series, fx=0.0, fy=0.0, moment=0.0, more=(0.0, 0.0, 0.0)):
+        """Force and moment in the plane; more: fz, and moments about x and y."""
         ops.timeSeries(*series)
         ops.pattern("Plain", 1, 1)
-        ops.load(tag, fx, fy, *((0.0, 0.0, 0.0) if self.spatial else ()), moment)
+        ops.load(tag, fx, fy, *(more if self.spatial else ()), moment)
 
     def where(self, tag):
-        return np.add(ops.nodeCoord(tag)[:2], [ops.nodeDisp(tag, c) for c in (1, 2)]).tolist()
+        n = 3 if self.free else 2
+        return np.add(ops.nodeCoord(tag)[:n], ops.nodeDisp(tag)[:n]).tolist()
 
 
 def analyse(newton, integrator, tolerance=1e-8, system="ProfileSPD", joined=False):
@@ -205,4 +234,24 @@ def cantilever(cells, dt, newton="full"):
     return followed(model, tip, round(p.end / dt), dt)
 
 
-RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}
+def tumbling_beam(cells, dt, newton="full", integrator="newmark", arms=False, steps=None):
+    p = PROBLEMS["P6"]
+    (chain,) = p.chains(cells)
+    model = Model("euler", spatial=True, free=True)
+    tags = model.add(chain)
+    if arms:
+        model.put_on_arms(tags, chain)
+    model.finish()
+    times, values = (-1.0, 0.0, p.until / 2, p.until, 1e3), (0.0, 0.0, p.peak, 0.0, 0.0)
+    fx, fy, *more, moment = *p.force, *p.moment
+    model.load(tags[0], ("Path", 1, "-time", *times, "-values", *values), fx, fy, moment, more)
+    analyse(newton, INTEGRATORS[integrator], joined=arms)
+    n = steps or round(p.end / dt)
+    energy, result = run(n, dt, model.energy, round(p.until / dt))
+    return result | {"values": {"ends": [model.where(tags[i]) for i in (0, -1)], "energy": energy}}
+
+
+RUNS = {
+    "P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever,
+    "P6": tumbling_beam,
+}  # fmt: skip

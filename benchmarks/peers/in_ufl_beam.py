@@ -59,7 +59,7 @@ def roll_up(cells, turns):
 
 
 def where(now, place):
-    return np.add(place.point, now.displacement(place)[:2]).tolist()
+    return np.add(place.point, now.displacement(place)[: len(place.point)]).tolist()
 
 
 def flying_beam(cells, dt, steps=None, pulse="sudden", **dials):
@@ -127,4 +127,18 @@ def cantilever(cells, dt, **dials):
     return result | {"values": {"tip": where(now, beam.end)}}
 
 
-RUNS = {"P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever}
+def tumbling_beam(cells, dt, steps=None, **dials):
+    p = PROBLEMS["P6"]
+    (beam,) = beams_of(p.chains(cells))
+    push = ub.PointLoad(beam.start, force=p.force, moment=p.moment, amplitude=p.push)
+    n = steps or round(p.end / dt)
+    scene, every = ub.Scene([beam], loads=[push]), round(p.until / dt)
+    now, told, result = run(scene, discretised(**dials), n * dt, n, energy, every)
+    ends = [where(now, at) for at in (beam.start, beam.end)]
+    return result | {"values": {"ends": ends, "energy": told}}
+
+
+RUNS = {
+    "P1": roll_up, "P2": flying_beam, "P3": swing, "P4": portal, "P5": cantilever,
+    "P6": tumbling_beam,
+}  # fmt: skip

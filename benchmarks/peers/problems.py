@@ -29,6 +29,10 @@ class Section(NamedTuple):
     EI: float  # N m^2
     rhoA: float  # kg/m
     rhoI: float  # kg m
+    GA3: float | None = None  # in space: shear along axis 3, bending about axis 2, torsion, inertia
+    EI2: float | None = None
+    GJ: float | None = None
+    rhoI2: float | None = None
 
     def times(self, factor):
         """Stiffer by a factor, of the same mass."""
@@ -38,19 +42,19 @@ class Section(NamedTuple):
 class Chain(NamedTuple):
     """A straight beam of equal cells with two nodes each."""
 
-    start: tuple[float, float]  # m
-    end: tuple[float, float]  # m
+    start: tuple[float, ...]  # m
+    end: tuple[float, ...]  # m
     section: Section
     cells: int
 
     @property
     def points(self):
-        """Nodes; (cells + 1, 2); m."""
+        """Nodes; (cells + 1, 2 or 3); m."""
         return np.linspace(self.start, self.end, self.cells + 1)
 
     @property
     def angle(self):
-        """Direction; rad."""
+        """Direction in the plane of x and y; rad."""
         return math.atan2(self.end[1] - self.start[1], self.end[0] - self.start[0])
 
     @property
@@ -208,10 +212,41 @@ class Cantilever:
         return {} if reference is None else {"error": math.dist(values["tip"], reference)}
 
 
+class TumblingBeam:
+    """A free beam in space, pushed and turned at its start until 5 s (Simo and Vu-Quoc 1988)."""
+
+    section = Section(
+        EA=1e4, GA=1e4, EI=500.0, rhoA=1.0, rhoI=10.0, GA3=1e4, EI2=500.0, GJ=500.0, rhoI2=10.0
+    )
+    force, moment = (0.1, 0.0, 0.0), (0.0, -0.5, -1.0)  # N, N m; times the factor
+    peak, until, end = 200.0, 5.0, 10.0  # -, s, s
+
+    def chains(self, cells):
+        return [Chain((6, 0, 0), (0, 8, 0), self.section, cells)]
+
+    def push(self, t):
+        """Factor of force and moment: it rises and falls until 5 s."""
+        return self.peak * max(0.0, min(t, self.until - t)) * 2 / self.until
+
+    def measures(self, values):
+        """Distance of both ends from the reference at 10 s, root of the mean square; m.
+
+        And the relative change of energy from the end of the push to 10 s.
+        """
+        energy = values["energy"]
+        told = {"drift": energy[-1] / energy[0] - 1}
+        reference = known("P6").get("ends")
+        if reference is not None:
+            away = np.subtract(values["ends"], reference)
+            told["error"] = float(np.sqrt(np.mean(np.sum(away**2, axis=1))))
+        return told
+
+
 PROBLEMS = {
     "P1": RollUp(),
     "P2": FlyingBeam(),
     "P3": Swing(),
     "P4": Portal(),
     "P5": Cantilever(),
+    "P6": TumblingBeam(),
 }

@@ -18,6 +18,7 @@ PICTURE = PAGE.parent / "pictures" / "peers.png"
 BEGIN, END = "<!-- written by `make bench-peers` -->\n", "<!-- end -->\n"
 NAMES = {
     "P1": "Roll-up", "P2": "Flying beam", "P3": "Swing", "P4": "Portal", "P5": "Cantilever",
+    "P6": "Tumbling beam",
 }  # fmt: skip
 PROGRAMS = {"ufl_beam": "ufl_beam", "exudyn": "Exudyn", "opensees": "OpenSees", "c": "C loop"}
 COLOURS = {"ufl_beam": RED, "exudyn": BLUE, "opensees": INK}
@@ -77,14 +78,19 @@ def of_times(records):
 
 
 def of_machine(records):
-    one = records[0]
-    commits = dict.fromkeys(r["commit"] for r in records)
-    versions = sorted({r["version"] for r in records if r.get("version", "C") != "C"})
-    rounds = max((len(r["wall"]) for r in records if "wall" in r), default=0)
-    return [
-        f"Commit {', '.join(commits)}, {one['processor']}, one thread; {', '.join(versions)}; "
-        f"medians of up to {rounds} rounds."
-    ]
+    """A line for each processor: its problems, commits and versions."""
+    lines = []
+    for processor in dict.fromkeys(r["processor"] for r in records):
+        some = [r for r in records if r["processor"] == processor]
+        problems = dict.fromkeys(NAMES[r["problem"]] for r in some)
+        commits = dict.fromkeys(r["commit"] for r in some)
+        versions = sorted({r["version"] for r in some if r.get("version", "C") != "C"})
+        rounds = max((len(r["wall"]) for r in some if "wall" in r), default=0)
+        lines += [
+            f"* {', '.join(problems)}: commit {', '.join(commits)}, {processor}, one thread; "
+            f"{', '.join(versions)}; medians of up to {rounds} rounds."
+        ]
+    return lines
 
 
 def save(records):

@@ -209,7 +209,8 @@ static int eliminate_pivots(int size, int pivots, double *F, int32_t *swap, doub
   int finite = 1;
   for (int i = 0; i < pivots; ++i) {
     double largest = 0;
-    for (int j = 0; j < size; ++j) largest = fmax(largest, fabs(F[(int64_t)i * size + j]));
+    for (int j = 0; j < size; ++j) /* a call of fmax takes longer */
+      if (fabs(F[(int64_t)i * size + j]) > largest) largest = fabs(F[(int64_t)i * size + j]);
     unit[i] = 1 / largest;
   }
   for (int first = 0; first < pivots; first += PANEL) {
