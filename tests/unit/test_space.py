@@ -511,9 +511,6 @@ def refused():
     return {
         "plot": lambda: ub.plot(run, "damage"),
         "response spectrum analysis": lambda: st.response_spectrum_analysis(scene, lambda T: 1.0),
-        "linearize": lambda: ub.linearize(
-            scene, inputs=[scene.supports[0]], outputs=[("displacement", BEAM.end)]
-        ),
         "joint": lambda: run.joint(None),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.forms,
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import basix.ufl
@@ -46,10 +46,14 @@ IN_UFL = (
 """Advice in the errors of curves that are no expressions of UFL."""
 
 
-@cache
+_numbers = list[Expr]()
+
+
 def number(i: int) -> Expr:
     """Return the symbol of the i-th number of a curve."""
-    return ufl.Constant(_MESH)
+    while len(_numbers) <= i:
+        _numbers.append(ufl.Constant(_MESH))
+    return _numbers[i]
 
 
 @lru_cache(maxsize=128)

@@ -53,8 +53,9 @@ def others_in_space(shape: DeformedShape) -> dict[str, list[Any]]:
                 tubes = [
                     lines_from_points(np.array(ends)).tube(radius=weight * unit / 20, n_sides=12)
                     for ends in pairwise(points)
+                    if np.linalg.norm(np.subtract(*ends)) > 1e-6 * unit  # else it has no points
                 ]
-                meshes[color].append(merge(tubes))
+                meshes[color] += [merge(tubes)] if tubes else []
                 continue
             middle, color = points[:-1].mean(axis=0), color if fill == WHITE else fill
             if len(points) > ROUND:
@@ -64,4 +65,4 @@ def others_in_space(shape: DeformedShape) -> dict[str, list[Any]]:
                 step = 0.6 * unit * FROM_A_SIDE / np.linalg.norm(FROM_A_SIDE)
                 plate = PolyData(points[:-1] - step / 2, [len(points) - 1, *range(len(points) - 1)])
                 meshes[color].append(plate.triangulate().extrude(step, capping=True))
-    return meshes
+    return {color: some for color, some in meshes.items() if some}

@@ -363,15 +363,15 @@ static void turn_node(const double *d, const double *before, double *m, double *
   multiply_turns(p, p, product), multiply_turns(way, product, end);
   const double sign = end[0] < 0 ? -1 : 1;
   for (int j = 0; j < 4; ++j) end[j] *= sign * c;
-  const double sine = length(end + 1), wide = sine > 0 ? 2 * atan2(sine, end[0]) / sine : 2;
+  const double sine = length(end + 1), ratio = sine > 0 ? 2 * atan2(sine, end[0]) / sine : 2;
   const double expected[] = {before[0] + spin[1], before[1] + spin[2], before[2] + spin[3]}, far = length(expected);
   /* Close to whole turns, the axis is that of the expected rotation. */
   const double *axis = sine > 1e-8 ? end + 1 : expected, unit = sine > 1e-8 ? sine : far > 0 ? far : 1;
-  for (int j = 0; j < 3; ++j) whole += axis[j] / unit * (expected[j] - wide * end[1 + j]);
+  for (int j = 0; j < 3; ++j) whole += axis[j] / unit * (expected[j] - ratio * end[1 + j]);
   whole = 2 * M_PI * round(whole / (2 * M_PI));
   for (int j = 0; j < 3; ++j) {
     m[j] = 4 * end[1 + j] / (1 + end[0]);
-    turning[j] = wide * end[1 + j] + whole * axis[j] / unit;
+    turning[j] = ratio * end[1 + j] + whole * axis[j] / unit;
   }
   if (old * sign < 0) m[0] += FLIPPED;
 }
