@@ -245,6 +245,7 @@ FURTHER = restarts, in_other_axes, by_reference, vibrations, recorders, derivati
 """Checks of some scenes whose run ends."""
 
 
+@pytest.mark.serial  # files of one process
 @pytest.mark.parametrize("seed", SAMPLE)
 def test_a_scene_in_space(seed):
     check(seed)

@@ -76,6 +76,7 @@ def test_free_motions_beside_damping():
     assert (exponents[3:].real < 0).all()
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
 @pytest.mark.parametrize("kind", ["laws", "fibres"])
 def test_reference_solver_with_inelastic_beams(kind, scheme):
@@ -95,6 +96,7 @@ def test_reference_solver_with_inelastic_beams(kind, scheme):
     assert np.isclose(*lost, rtol=1e-9)
 
 
+@pytest.mark.serial
 def test_reference_solver_with_friction_by_the_force_of_a_joint():
     """The limit of a step has the force of the step before, in both solvers."""
     ball, foot = ub.Body((0, 0, 0), mass=2.0, inertia=(1, 1, 1)), ub.ground(0, 0, 0)

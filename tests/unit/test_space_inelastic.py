@@ -351,6 +351,7 @@ def test_balance_of_hinges_about_several_axes():
     assert min(lost) > 0, "all hinges open"
 
 
+@pytest.mark.serial
 @pytest.mark.parametrize("kind", ["between nodes", "in a cell", "about two axes"])
 def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
     """A cell is turned about axis 3 by a motor; between nodes to the series of the angle, 1e-9."""
@@ -517,6 +518,7 @@ def test_start_from_a_state_in_between():
     assert np.abs(tips[0] - tips[1]).max() < 1e-10 * np.abs(tips[0]).max()
 
 
+@pytest.mark.serial
 def test_solution_with_fibres_is_saved(tmp_path):
     beam = ub.Beam((0, 0, 0), (1, 0, 0), square(4, 0.0, ub.ElastoPlastic(fy)), cells=2)
     load = ub.PointLoad(beam.end, force=(0, 1e6, 2e6), amplitude=lambda t: t)

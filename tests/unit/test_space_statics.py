@@ -165,6 +165,7 @@ def test_a_pendulum_away_from_its_equilibrium_is_refused():
     assert "nan" not in str(raised.value)
 
 
+@pytest.mark.serial
 def test_options_of_petsc_and_the_reference_solver_find_the_same_arc():
     options = None, ub.Newton(petsc={"snes_max_fail": 3}), ub.Newton(reference=True)
     runs = [statics(bend(4), 0.125, newton=x) for x in options]
