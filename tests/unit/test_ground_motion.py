@@ -210,3 +210,13 @@ def test_rayleigh_damping_has_the_ratios(ratios):
     damping = ub.Rayleigh.with_ratios(ratios, (5.0, 40.0))
     at = [damping.mass / (2 * w) + damping.stiffness * w / 2 for w in (5.0, 40.0)]
     np.testing.assert_allclose(at, ratios, rtol=1e-14)
+
+
+def test_adaptive_steps_end_at_samples_of_a_record():
+    """The velocity of a support has a kink at each sample of the acceleration."""
+    motion = st.GroundMotion(0.25, [0.0, 1.0, -1.0, 0.0, 0.0])
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1e3, rhoA=1.0, rhoI=1.0))
+    foot = ub.PrescribedDisplacement(beam.start, u=0.0, v=motion.displacement, psi=0.0)
+    scene = ub.Scene([beam], supports=[foot])
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=ub.Adaptive(1e-2), progress=False)
+    assert {0.25, 0.5, 0.75} <= set(run.times)
