@@ -24,22 +24,26 @@ from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succeeds
 
 
-def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
+def _interior_vertices(
+    cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_], unknowns: int
+) -> tuple[Any, ...]:
     """Find the vertices of the cells of one process that couple only to their two neighbours.
 
     The pattern of the matrix determines them, so any kind of coupling is taken into account.
     ``alone`` marks local degrees of freedom that no other process has.
 
     Returns:
-        Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
+        Degrees of freedom of the vertices, chain after chain; (num_vertices, n).  A vertex has n
+        unknowns: three in the plane, six in space.
         Index of the first vertex of each chain, and last the number of vertices.
-        Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
+        Degrees of freedom of the left and the right end of each chain; (num_chains, 2 n).
         True for a chain with a left end, to which elimination couples all its vertices.  Other
         chains begin at a vertex with one neighbour; both their ends are the right end.
         Positions in the rows of each vertex at which the columns of the previous vertex, the vertex
         itself and the next vertex begin; (num_vertices, 3).
     """
-    nodes = cell_dofs.shape[1] // 3
+    n = unknowns
+    nodes = cell_dofs.shape[1] // n
     start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
     # Vertex k is between the cells k and k + 1.
     around = np.hstack([start[:-1], end[:-1], end[1:]])
@@ -52,7 +56,7 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
         successive = (np.diff(dofs, axis=1) == 1).all(axis=1)
         return np.asarray((counts[dofs] == number).all(axis=1) & successive)
 
-    inside &= has(9, end[:-1])  # three for the vertex and each of its two neighbours
+    inside &= has(3 * n, end[:-1])  # those of the vertex and of its two neighbours
     is_first = np.zeros(len(inside), dtype=bool)
     is_first[np.unique(end[:-1, 0], return_index=True)[1]] = True
     inside &= is_first
@@ -65,15 +69,15 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
 
     # A chain between two free ends is divided at its middle, and eliminated from both ends.
     _, first, last = _runs(inside)
-    both_free = has(6, start[:-1][first]) & has(6, end[1:][last])
+    both_free = has(2 * n, start[:-1][first]) & has(2 * n, end[1:][last])
     both_free &= last - first > 1
     inside[(first + last)[both_free] // 2] = False
 
     chain, first, last = _runs(inside)
     left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
     before, after = start[:-1][inside], end[1:][inside]
-    # A vertex with six entries per row is a free end: its only neighbour is in the chain.
-    free_left, free_right = has(6, left), has(6, right)
+    # A vertex with 2 n entries per row is a free end: its only neighbour is in the chain.
+    free_left, free_right = has(2 * n, left), has(2 * n, right)
     backward = free_right & ~free_left
     free = free_left | free_right
     long = last - first + 1
@@ -82,17 +86,17 @@ def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -
     position = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
     position = np.where(backward[chain], long[chain] - 1 - position, position)
     place = begin[chain] + free[chain] + position
-    around = np.empty((chain_begin[-1], 3, 3), dtype=np.int32)
+    around = np.empty((chain_begin[-1], 3, n), dtype=np.int32)
     around[place, 1] = middle_
     around[place, 0] = np.where(backward[chain, None], after, before)
     around[place, 2] = np.where(backward[chain, None], before, after)
-    around[begin[free], 0] = A.size + np.arange(3)
+    around[begin[free], 0] = A.size + np.arange(n)
     around[begin[free], 1] = np.where(backward[:, None], right, left)[free]
     around[begin[free], 2] = around[begin[free] + 1, 1]
     right = np.where(backward[:, None], left, right)
     ends = np.hstack([np.where(free[:, None], right, left), right])
     at = np.zeros(around.shape[:2], dtype=np.uint8)
-    for column in around.reshape(-1, 9).T:
+    for column in around.reshape(-1, 3 * n).T:
         at += around[:, :, 0] > column[:, None]
     return around[:, 1], chain_begin, ends, ~free, at
 
@@ -113,7 +117,13 @@ INDICES = (
 
 @cached_by_structure
 def _plan(
-    cell_dofs: Index, indptr: Index, indices: Index, alone: Index, dofs: Index, num_owned: int
+    cell_dofs: Index,
+    indptr: Index,
+    indices: Index,
+    alone: Index,
+    dofs: Index,
+    num_owned: int,
+    unknowns: int,
 ) -> tuple[Index, ...]:
     """Find the vertices that can be eliminated, and the positions of entries in the reduced matrix.
 
@@ -123,7 +133,9 @@ def _plan(
         :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
-    vertices, chain_begin, chain_ends, spikes, at = _interior_vertices(cell_dofs, A, alone)
+    vertices, chain_begin, chain_ends, spikes, at = _interior_vertices(
+        cell_dofs, A, alone, unknowns
+    )
     stays = np.ones(A.size, dtype=bool)
     stays[vertices] = False
     remaining = np.flatnonzero(stays)
@@ -133,7 +145,7 @@ def _plan(
     ends, owned = number[chain_ends], remaining[remaining < num_owned]
     first, last = (vertices[k] for k in (chain_begin[:-1], chain_begin[1:] - 1))
     next_to = np.stack([np.where(spikes[:, None], first, last), last], axis=1)
-    end_dofs = chain_ends.reshape(-1, 2, 3)
+    end_dofs = chain_ends.reshape(-1, 2, unknowns)
     rows = np.stack([end_dofs, next_to], axis=1)[..., None]
     columns = np.stack([next_to, end_dofs], axis=1)[..., None, :]
     with_ends = A.positions(*map(np.ravel, np.broadcast_arrays(rows, columns)))
@@ -143,7 +155,7 @@ def _plan(
     row, column = np.repeat(number[rows], np.diff(A.indptr)[rows]), number[A.indices[entry]]
     entry, row, column = entry[column >= 0], row[column >= 0], column[column >= 0]
     key = row.astype(np.int64) * size + column
-    block = ends.astype(np.int64).reshape(-1, 2, 3)
+    block = ends.astype(np.int64).reshape(-1, 2, unknowns)
     block_keys = (block[:, :, None, :, None] * size + block[:, None, :, None, :]).ravel()
     keys = np.unique(np.concatenate([key, block_keys]))
     place, places = (np.searchsorted(keys, x) for x in (key, block_keys))
@@ -161,19 +173,16 @@ class Elimination:
     See substructuring.py.  The entries of ``A`` must not change between :meth:`factor` and the last
     :meth:`expand` after it.  On one process, C uses :attr:`c` directly, see newton.c.
 
-    Blocks of three belong to nodes in the plane; in space, no unknowns are eliminated.
-
     Attributes:
         shared: True for remaining unknowns that other processes have, too.
         c: ``chains`` of loops.h.
     """
 
-    def __init__(self, subdomain: Subdomain, A: Csr, *, planar: bool = True) -> None:
+    def __init__(self, subdomain: Subdomain, A: Csr, unknowns: int = 3) -> None:
         ghosts = np.concatenate(subdomain.comm.allgather(subdomain.dofs[subdomain.num_owned :]))
         alone = ~np.isin(subdomain.dofs, ghosts)
-        chains = subdomain.cell_dofs if planar else np.zeros((0, 6), dtype=np.int32)
-        pattern = chains, A.indptr, A.indices, alone, subdomain.dofs
-        remaining, at, indptr, columns, *arrays = _plan(*pattern, subdomain.num_owned)
+        pattern = subdomain.cell_dofs, A.indptr, A.indices, alone, subdomain.dofs
+        remaining, at, indptr, columns, *arrays = _plan(*pattern, subdomain.num_owned, unknowns)
         self.dofs, self.shared = subdomain.dofs[remaining], ~alone[remaining]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(remaining))
@@ -181,10 +190,11 @@ class Elimination:
         vertices, number = len(indices["dof"]), len(indices["spike"])
         self.c = fill(
             ffi.new("chains *"),
-            count=number, left=len(columns), stay=len(indices["entry"]),
+            count=number, unknowns=unknowns, left=len(columns), stay=len(indices["entry"]),
             rows=len(indices["kept"]), left_size=len(remaining), left_data=self.left.data,
-            left_f=self.f, data=A.data, swaps=ffi.new("uint8_t[]", 3 * vertices),
-            pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
+            left_f=self.f, data=A.data, swaps=ffi.new("uint8_t[]", unknowns * vertices),
+            pivots=np.empty(unknowns**2 * vertices),
+            to_next=np.empty(unknowns**2 * vertices),
             f=np.empty(subdomain.size), at=ffi.from_buffer("uint8_t[]", at), **indices,
         )  # fmt: skip
 
@@ -211,8 +221,9 @@ class CondensedSolver:
     """
 
     def __init__(self, subdomain: Subdomain, A: Csr) -> None:
-        planar = not subdomain.numbering.scene.in_space
-        self._elimination = Elimination(subdomain, A, planar=planar)
+        self._elimination = Elimination(
+            subdomain, A, 6 if subdomain.numbering.scene.in_space else 3
+        )
         self._is_new = self._good = False
         # If only connectors hold a beam, elimination may leave zeros or round-off on the diagonal.
         # Several fronts then exchange too few rows; KLU exchanges enough.

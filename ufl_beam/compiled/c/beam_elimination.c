@@ -1,68 +1,82 @@
 /* SPDX-License-Identifier: MIT */
-/* Block elimination (3 x 3) of the interior vertices of chains; see beam_elimination.py.
+/* Block elimination of the interior vertices of chains; see beam_elimination.py.
  *
  * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so
  * that each vertex couples to the left end and to the next vertex when it is eliminated. A chain
- * that begins at a vertex with one neighbour has no left end. The rows dof[v], dof[v] + 1 and
- * dof[v] + 2 of vertex v are contiguous in data from begin[v] on. Each row has nine entries, or six
- * if there is only one neighbour. From at[3 v + n] on, three of them are the columns of the vertex
- * before (n = 0), of v (1) and of the vertex after (2). The degrees of freedom of an end may have
- * any numbers.
+ * that begins at a vertex with one neighbour has no left end. A vertex has n unknowns: three in the
+ * plane, six in space. Its rows, from dof[v] on, are contiguous in data from begin[v] on. Each row
+ * has 3 n entries, or 2 n if there is only one neighbour. From at[3 v + k] on, n of them are the
+ * columns of the vertex before (k = 0), of v (1) and of the vertex after (2). The degrees of freedom
+ * of an end may have any numbers.
  */
 
+enum { PLANE = 3, SPACE = 6 }; /* unknowns of a vertex */
+
 /* y -= A x */
-static inline void subtract(const double *A, const double *x, double *y)
+static inline void subtract(const int n, const double *A, const double *x, double *y)
 {
-  for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
+  for (int i = 0; i < n; ++i, A += n) {
+    double sum = A[0] * x[0];
+    for (int k = 1; k < n; ++k) sum += A[k] * x[k];
+    y[i] -= sum;
+  }
 }
 
 /* x = D^-1 b */
-static inline void solve_block(const double *D, const uint8_t *swap, const double *b, double *x)
+static inline void solve_block(const int n, const double *D, const uint8_t *swap, const double *b,
+                               double *x)
 {
-  const double x0 = b[swap[0]], x1 = b[swap[1]] - D[3] * x0;
-  x[2] = (b[swap[2]] - D[6] * x0 - D[7] * x1) * D[8];
-  x[1] = (x1 - D[5] * x[2]) * D[4];
-  x[0] = (x0 - D[1] * x[1] - D[2] * x[2]) * D[0];
+  for (int i = 0; i < n; ++i) {
+    x[i] = b[swap[i]];
+    for (int k = 0; k < i; ++k) x[i] -= D[n * i + k] * x[k];
+  }
+  for (int i = n - 1; i >= 0; --i) {
+    for (int k = i + 1; k < n; ++k) x[i] -= D[n * i + k] * x[k];
+    x[i] *= D[n * i + i];
+  }
 }
 
 /* Read the block of a vertex, whose rows have `width` entries, with a neighbour in its chain or
- * with itself. The numbers are written `apart` from each other. */
-static inline void read_block(const chains *c, int vertex, int neighbour, int width, double *block,
-                              int apart)
+ * with itself. The rows are written `far` from each other, their numbers `apart`. */
+static inline void read_block(const chains *c, const int n, int vertex, int neighbour, int width,
+                              double *block, const int far, const int apart)
 {
   const double *row = c->data + c->begin[vertex] + c->at[3 * vertex + neighbour];
-  for (int r = 0; r < 3; ++r, row += width)
-    for (int k = 0; k < 3; ++k, block += apart) *block = row[k];
+  for (int r = 0; r < n; ++r, row += width, block += far)
+    for (int k = 0; k < n; ++k) block[apart * k] = row[k];
 }
 
 /* Read a block of a chain with its ends, see end_block. */
-static inline void read_block_of_end(const chains *c, int chain, int which, double *block, int apart)
+static inline void read_block_of_end(const chains *c, const int n, int chain, int which,
+                                     double *block, const int far, const int apart)
 {
-  const int32_t *entry = c->with_ends + 36 * chain + 9 * which;
-  for (int k = 0; k < 9; ++k, block += apart) *block = c->data[entry[k]];
+  const int32_t *entry = c->with_ends + n * n * (4 * chain + which);
+  for (int r = 0; r < n; ++r, entry += n, block += far)
+    for (int k = 0; k < n; ++k) block[apart * k] = c->data[entry[k]];
 }
 
 /* Read the block that couples the rows of the next vertex, or of the right end, to a vertex. */
-static inline void read_below(const chains *c, int chain, int vertex, double *block, int apart)
+static inline void read_below(const chains *c, const int n, int chain, int vertex, double *block,
+                              const int far, const int apart)
 {
   if (vertex + 1 < c->first[chain + 1])
-    read_block(c, vertex + 1, 0, 9, block, apart);
+    read_block(c, n, vertex + 1, 0, 3 * n, block, far, apart);
   else
-    read_block_of_end(c, chain, RIGHT_LAST, block, apart);
+    read_block_of_end(c, n, chain, RIGHT_LAST, block, far, apart);
 }
 
 /* Read the block that couples the rows of a vertex, with `width` entries each, to the next vertex
  * or right end. */
-static inline void read_after(const chains *c, int chain, int vertex, int width, double *block,
-                              int apart)
+static inline void read_after(const chains *c, const int n, int chain, int vertex, int width,
+                              double *block, const int far, const int apart)
 {
   if (vertex + 1 < c->first[chain + 1])
-    read_block(c, vertex, 2, width, block, apart);
+    read_block(c, n, vertex, 2, width, block, far, apart);
   else
-    read_block_of_end(c, chain, LAST_RIGHT, block, apart);
+    read_block_of_end(c, n, chain, LAST_RIGHT, block, far, apart);
 }
 
-/* -- two chains at once ------------------------------------------------------------------------- */
+/* -- in the plane: two chains at once ---------------------------------------------------------- */
 
 /* Each vertex depends on the previous vertex of its chain, but not on other chains. So each vector
  * has one number of each of two chains. */
@@ -171,14 +185,14 @@ static void begin_chain(const chains *c, chain_fronts *at, int lane)
   const int chain = at->counts[lane] ? at->next++ : at->chain[1 - lane];
   const int v = c->first[chain], width = c->spike[chain] ? 9 : 6;
   at->chain[lane] = chain, at->vertex[lane] = v, at->last[lane] = c->first[chain + 1] - 1;
-  read_block(c, v, 1, width, (double *)at->pivot + lane, PAIR);
-  read_after(c, chain, v, width, (double *)at->after + lane, PAIR);
+  read_block(c, 3, v, 1, width, (double *)at->pivot + lane, 3 * PAIR, PAIR);
+  read_after(c, 3, chain, v, width, (double *)at->after + lane, 3 * PAIR, PAIR);
   for (int k = 0; k < 3; ++k) at->f[k][lane] = at->left_f[k][lane] = 0;
   for (int k = 0; k < 9; ++k) at->to[k][lane] = at->from[k][lane] = at->left[k][lane] = 0;
   at->faded[lane] = 0;
   if (!c->spike[chain]) return;
-  read_block_of_end(c, chain, FIRST_LEFT, (double *)at->to + lane, PAIR);
-  read_block_of_end(c, chain, LEFT_FIRST, (double *)at->from + lane, PAIR);
+  read_block_of_end(c, 3, chain, FIRST_LEFT, (double *)at->to + lane, 3 * PAIR, PAIR);
+  read_block_of_end(c, 3, chain, LEFT_FIRST, (double *)at->from + lane, 3 * PAIR, PAIR);
   at->faded[lane] = 0x1p-511 * fmin(largest_entry(at->to, lane), largest_entry(at->from, lane));
 }
 
@@ -221,10 +235,10 @@ static inline void read_next(const chains *c, chain_fronts *at, pair *below, con
   }
   for (int l = 0; l < PAIR; ++l) {
     const int chain = at->chain[l], v = at->vertex[l];
-    read_below(c, chain, v, (double *)below + l, PAIR);
+    read_below(c, 3, chain, v, (double *)below + l, 3 * PAIR, PAIR);
     if (v < at->last[l]) {
-      read_block(c, v + 1, 1, 9, (double *)at->pivot + l, PAIR);
-      read_after(c, chain, v + 1, 9, (double *)at->after + l, PAIR);
+      read_block(c, 3, v + 1, 1, 9, (double *)at->pivot + l, 3 * PAIR, PAIR);
+      read_after(c, 3, chain, v + 1, 9, (double *)at->after + l, 3 * PAIR, PAIR);
     } else
       for (int k = 0; k < 9; ++k) at->pivot[k][l] = at->after[k][l] = 0;
   }
@@ -271,7 +285,7 @@ static inline void eliminate_vertices(const chains *c, chain_fronts *at, const d
   solve_rows(far, TO, row);
   for (int l = 0; l < PAIR; ++l) {
     const int v = at->vertex[l]++;
-    double *pivot = c->pivots + BLOCK * v, *to_next = c->to_next + BLOCK * v, *f = c->f + c->dof[v];
+    double *pivot = c->pivots + 9 * v, *to_next = c->to_next + 9 * v, *f = c->f + c->dof[v];
     uint8_t *order = c->swaps + 3 * v;
     for (int r = 0; r < 3; ++r) {
       order[r] = (uint8_t)swap[r][l];
@@ -289,14 +303,9 @@ static inline int to_go(const chain_fronts *at, int lane)
   return at->last[lane] - at->vertex[lane] + 1;
 }
 
-/* Eliminate all vertices from the matrix and from the right-hand side b. The reduced system
- * consists of the entries that stay and the Schur complements of the chains. */
-void eliminate(const chains *c, const double *b)
+/* Eliminate all vertices of planar scenes. */
+static void eliminate_in_plane(const chains *c, const double *b)
 {
-  memset(c->left_data, 0, c->left * sizeof *c->left_data);
-  memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
-  for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
-  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
   chain_fronts at = {.next = 0};
   if (c->count)
     for (int l = 0; l < PAIR; ++l) begin_chain(c, &at, l);
@@ -317,26 +326,169 @@ void eliminate(const chains *c, const double *b)
   }
 }
 
-static inline void read_vertex(const chains *c, const double *f, int vertex, double *y)
+/* -- in space: rows of a chain ----------------------------------------------------------------- */
+
+/* A row of six numbers. */
+typedef double octet __attribute__((vector_size(64), aligned(8), may_alias));
+
+/* Rows [A | B | C] become [LU | L^-1 B | L^-1 C], with column pivoting, as factor_rows does. */
+static inline void factor_six(octet *A, octet *B, octet *C, uint8_t *swap, const int spike)
 {
-  for (int r = 0; r < 3; ++r) y[r] = f[c->dof[vertex] + r];
+#define EXCHANGE(x, y) do { const octet old = x; x = y, y = old; } while (0)
+  for (int k = 0; k < 6; ++k) swap[k] = (uint8_t)k;
+  for (int k = 0; k < 6; ++k) {
+    int largest = k;
+    for (int i = k + 1; i < 6; ++i)
+      if (fabs(A[i][k]) > fabs(A[largest][k])) largest = i;
+    if (largest != k) {
+      EXCHANGE(A[k], A[largest]);
+      EXCHANGE(B[k], B[largest]);
+      if (spike) EXCHANGE(C[k], C[largest]);
+      const uint8_t old = swap[k];
+      swap[k] = swap[largest], swap[largest] = old;
+    }
+    const double reciprocal = 1 / A[k][k]; /* not finite for a singular block, and so are the results */
+    octet later = A[k];
+    for (int j = 0; j <= k; ++j) later[j] = 0;
+    A[k][k] = reciprocal;
+    for (int i = k + 1; i < 6; ++i) {
+      const double part = A[i][k] * reciprocal;
+      A[i] -= part * later;
+      A[i][k] = part;
+      B[i] -= part * B[k];
+      if (spike) C[i] -= part * C[k];
+    }
+  }
+#undef EXCHANGE
 }
 
-static inline void write_vertex(const chains *c, const double *y, int vertex, double *f)
+/* The transpose of A becomes that of A U^-1. */
+static inline void divide_six(const octet *LU, octet *A)
 {
-  for (int r = 0; r < 3; ++r) f[c->dof[vertex] + r] = y[r];
+  for (int k = 0; k < 6; ++k) {
+    for (int j = 0; j < k; ++j) A[k] -= LU[j][k] * A[j];
+    A[k] *= LU[k][k];
+  }
+}
+
+/* Y -= A X for `rows` rows of Y, from the transpose of A; subtracts the latest results last */
+static inline void subtract_six(const int rows, const octet *A, const octet *X, octet *Y)
+{
+  for (int i = 0; i < rows; ++i)
+    for (int k = 0; k < 6; ++k) Y[i] -= A[k][i] * X[k];
+}
+
+/* As drop_faded does. */
+static inline void drop_faded_six(octet *block, double faded)
+{
+  for (int i = 0; i < 6; ++i)
+    for (int k = 0; k < 6; ++k)
+      if (fabs(block[i][k]) < faded) block[i][k] = 0;
+}
+
+/* Eliminate the vertices of a chain from the matrix and from the right-hand side b. Columns 6 of `next` and row 6 of `from`
+ * are right-hand sides. */
+static inline void eliminate_in_space(const chains *c, int chain, const double *b, const int spike)
+{
+  enum { FAR = 8, F = 6 };
+  const int begin = c->first[chain], end = c->first[chain + 1];
+  octet A[6], B[6], C[6], below[6], next[6] = {0}, to[6] = {0}, from[7] = {0}, left[6] = {0};
+  double faded = 0;
+  read_block(c, 6, begin, 1, spike ? 18 : 12, (double *)next, FAR, 1);
+  if (spike) {
+    read_block_of_end(c, 6, chain, FIRST_LEFT, (double *)to, FAR, 1);
+    read_block_of_end(c, 6, chain, LEFT_FIRST, (double *)from, 1, FAR);
+    for (int k = 0; k < 48; ++k) faded = fmax(faded, fabs(((double *)to)[k]));
+    double largest = 0;
+    for (int k = 0; k < 48; ++k) largest = fmax(largest, fabs(((double *)from)[k]));
+    faded = 0x1p-511 * fmin(faded, largest);
+  }
+  memset(below, 0, sizeof below), memset(B, 0, sizeof B);
+  for (int v = begin; v < end; ++v) {
+    uint8_t *swap = c->swaps + 6 * v;
+    double *pivot = c->pivots + 36 * v, *to_next = c->to_next + 36 * v, *f = c->f + c->dof[v];
+    memcpy(A, next, sizeof A);
+    if (spike) memcpy(C, to, sizeof C);
+    read_after(c, 6, chain, v, spike || v > begin ? 18 : 12, (double *)B, FAR, 1);
+    for (int r = 0; r < 6; ++r) B[r][F] = next[r][F] + b[c->dof[v] + r];
+    factor_six(A, B, C, swap, spike);
+    read_below(c, 6, chain, v, (double *)below, 1, FAR);
+    divide_six(A, below);
+    memset(next, 0, sizeof next);
+    if (v + 1 < end) read_block(c, 6, v + 1, 1, 18, (double *)next, FAR, 1);
+    subtract_six(6, below, B, next);
+    if (spike) {
+      memset(to, 0, sizeof to);
+      divide_six(A, from);
+      subtract_six(6, below, C, to);
+      subtract_six(6, from, C, left);
+      octet old[6];
+      memcpy(old, from, sizeof old);
+      memset(from, 0, sizeof old);
+      subtract_six(7, B, old, from);
+      drop_faded_six(to, faded), drop_faded_six(from, faded);
+    }
+    for (int k = 5; k >= 0; --k) {
+      for (int j = k + 1; j < 6; ++j) B[k] -= A[k][j] * B[j];
+      B[k] *= A[k][k];
+    }
+    for (int r = 0; r < 6; ++r) {
+      f[r] = B[r][F];
+      for (int k = 0; k < 6; ++k) pivot[6 * r + k] = A[r][k], to_next[6 * r + k] = B[r][k];
+    }
+  }
+  const int32_t *place = c->places + 4 * 36 * chain, *numbers = c->ends + 12 * chain;
+  for (int r = 0; r < 6; ++r)
+    for (int k = 0; k < 6; ++k) {
+      const int32_t *at = place + 6 * r + k;
+      c->left_data[at[0]] += left[r][k];
+      c->left_data[at[36]] += from[k][r];
+      c->left_data[at[72]] += to[r][k];
+      c->left_data[at[108]] += next[r][k];
+    }
+  for (int k = 0; k < 6; ++k) {
+    c->left_f[numbers[k]] += from[F][k];
+    c->left_f[numbers[6 + k]] += next[k][F];
+  }
+}
+
+/* -- in both ----------------------------------------------------------------------------------- */
+
+/* Eliminate all vertices from the matrix and from the right-hand side b. The reduced system
+ * consists of the entries that stay and the Schur complements of the chains. */
+void eliminate(const chains *c, const double *b)
+{
+  memset(c->left_data, 0, c->left * sizeof *c->left_data);
+  memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
+  for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
+  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
+  if (c->unknowns == PLANE) eliminate_in_plane(c, b);
+  else
+    for (int chain = 0; chain < c->count; ++chain)
+      if (c->spike[chain]) eliminate_in_space(c, chain, b, 1);
+      else eliminate_in_space(c, chain, b, 0);
+}
+
+static inline void read_vertex(const chains *c, const int n, const double *f, int vertex, double *y)
+{
+  for (int r = 0; r < n; ++r) y[r] = f[c->dof[vertex] + r];
+}
+
+static inline void write_vertex(const chains *c, const int n, const double *y, int vertex, double *f)
+{
+  for (int r = 0; r < n; ++r) f[c->dof[vertex] + r] = y[r];
 }
 
 /* y = D^-1 b of a vertex, and its contribution to the right-hand side of the next vertex or right
  * end */
-static inline void go_on(const chains *c, int chain, int vertex, const double *b, double *y,
-                         double *next)
+static inline void go_on(const chains *c, const int n, int chain, int vertex, const double *b,
+                         double *y, double *next)
 {
-  double below[9];
-  solve_block(c->pivots + BLOCK * vertex, c->swaps + 3 * vertex, b, y);
-  read_below(c, chain, vertex, below, 1);
-  memset(next, 0, 3 * sizeof *next);
-  subtract(below, y, next);
+  double below[SPACE * SPACE];
+  solve_block(n, c->pivots + n * n * vertex, c->swaps + n * vertex, b, y);
+  read_below(c, n, chain, vertex, below, n, 1);
+  memset(next, 0, n * sizeof *next);
+  subtract(n, below, y, next);
 }
 
 /* Number of vertices of the longest of PAIR chains, or of the last chain alone. Loops alternate
@@ -353,62 +505,99 @@ static inline int most_vertices(const chains *c, int chain)
 
 /* Contribution of the first vertex to the right-hand side of the left end with both ends held, from
  * f. */
-static void feel_first_vertex(const chains *c, int chain, double *left)
+static inline void feel_first_vertex(const chains *c, const int n, int chain, double *left)
 {
   const int end = c->first[chain + 1];
-  double from[9], x[3], y[3];
-  read_vertex(c, c->f, end - 1, y);
+  double from[SPACE * SPACE], x[SPACE], y[SPACE];
+  read_vertex(c, n, c->f, end - 1, y);
   for (int v = end - 2; v >= c->first[chain]; --v) {
-    read_vertex(c, c->f, v, x);
-    subtract(c->to_next + BLOCK * v, y, x);
+    read_vertex(c, n, c->f, v, x);
+    subtract(n, c->to_next + n * n * v, y, x);
     memcpy(y, x, sizeof y);
   }
-  read_block_of_end(c, chain, LEFT_FIRST, from, 1);
-  subtract(from, y, left);
+  read_block_of_end(c, n, chain, LEFT_FIRST, from, n, 1);
+  subtract(n, from, y, left);
+}
+
+static inline void reduce_blocks(const chains *c, const int n, const double *b)
+{
+  memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
+  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
+  for (int chain = 0; chain < c->count; chain += PAIR) {
+    double next[PAIR][SPACE] = {0};
+    const int most = most_vertices(c, chain);
+    for (int k = 0; k < most; ++k)
+      for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
+        const int v = c->first[chain + l] + k;
+        double x[SPACE], y[SPACE];
+        if (v >= c->first[chain + l + 1]) continue;
+        read_vertex(c, n, b, v, x);
+        for (int r = 0; r < n; ++r) x[r] += next[l][r];
+        go_on(c, n, chain + l, v, x, y, next[l]);
+        write_vertex(c, n, y, v, c->f);
+      }
+    for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
+      const int32_t *numbers = c->ends + 2 * n * (chain + l);
+      double left[SPACE] = {0};
+      if (c->spike[chain + l]) feel_first_vertex(c, n, chain + l, left);
+      for (int k = 0; k < n; ++k) {
+        c->left_f[numbers[k]] += left[k];
+        c->left_f[numbers[n + k]] += next[l][k];
+      }
+    }
+  }
 }
 
 /* Eliminate all vertices from another right-hand side; f gets D^-1 times the reduced right-hand
  * side. */
 void reduce(const chains *c, const double *b)
 {
-  memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
-  for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
-  for (int chain = 0; chain < c->count; chain += PAIR) {
-    double next[PAIR][3] = {0};
-    const int most = most_vertices(c, chain);
-    for (int k = 0; k < most; ++k)
-      for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
-        const int v = c->first[chain + l] + k;
-        double x[3], y[3];
-        if (v >= c->first[chain + l + 1]) continue;
-        read_vertex(c, b, v, x);
-        for (int r = 0; r < 3; ++r) x[r] += next[l][r];
-        go_on(c, chain + l, v, x, y, next[l]);
-        write_vertex(c, y, v, c->f);
-      }
-    for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
-      const int32_t *numbers = c->ends + 6 * (chain + l);
-      double left[3] = {0};
-      if (c->spike[chain + l]) feel_first_vertex(c, chain + l, left);
-      for (int k = 0; k < 3; ++k) {
-        c->left_f[numbers[k]] += left[k];
-        c->left_f[numbers[3 + k]] += next[l][k];
-      }
-    }
-  }
+  if (c->unknowns == PLANE) reduce_blocks(c, PLANE, b);
+  else reduce_blocks(c, SPACE, b);
+}
+
+static inline double largest_of(const int n, const double *x)
+{
+  double largest = 0;
+  for (int k = 0; k < n; ++k) largest = fmax(largest, fabs(x[k]));
+  return largest;
 }
 
 /* Add the effect of the motion of the left end to f, until it has decayed. */
-static void follow_left_end(const chains *c, int chain, const double *left)
+static inline void follow_left_end(const chains *c, const int n, int chain, const double *left)
 {
-  double to[9], y[3], next[3] = {0};
-  read_block_of_end(c, chain, FIRST_LEFT, to, 1);
-  subtract(to, left, next);
-  const double faded = 0x1p-511 * fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2])));
+  double to[SPACE * SPACE], y[SPACE], next[SPACE] = {0};
+  read_block_of_end(c, n, chain, FIRST_LEFT, to, n, 1);
+  subtract(n, to, left, next);
+  const double faded = 0x1p-511 * largest_of(n, next);
   for (int v = c->first[chain]; v < c->first[chain + 1]; ++v) {
-    if (fmax(fabs(next[0]), fmax(fabs(next[1]), fabs(next[2]))) <= faded) return;
-    go_on(c, chain, v, next, y, next);
-    for (int r = 0; r < 3; ++r) c->f[c->dof[v] + r] += y[r];
+    if (largest_of(n, next) <= faded) return;
+    go_on(c, n, chain, v, next, y, next);
+    for (int r = 0; r < n; ++r) c->f[c->dof[v] + r] += y[r];
+  }
+}
+
+static inline void expand_blocks(const chains *c, const int n, const double *left, double *x)
+{
+  for (int k = 0; k < c->rows; ++k) x[c->kept[k]] = left[c->number[k]];
+  for (int chain = 0; chain < c->count; chain += PAIR) {
+    double first[SPACE], next[PAIR][SPACE];
+    const int most = most_vertices(c, chain);
+    for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
+      const int32_t *numbers = c->ends + 2 * n * (chain + l);
+      for (int k = 0; k < n; ++k) first[k] = left[numbers[k]], next[l][k] = left[numbers[n + k]];
+      if (c->spike[chain + l]) follow_left_end(c, n, chain + l, first);
+    }
+    for (int k = 1; k <= most; ++k)
+      for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
+        const int v = c->first[chain + l + 1] - k;
+        double y[SPACE];
+        if (v < c->first[chain + l]) continue;
+        read_vertex(c, n, c->f, v, y);
+        subtract(n, c->to_next + n * n * v, next[l], y);
+        memcpy(next[l], y, sizeof y);
+        write_vertex(c, n, y, v, x);
+      }
   }
 }
 
@@ -416,26 +605,8 @@ static void follow_left_end(const chains *c, int chain, const double *left)
  * x may be f. */
 void expand(const chains *c, const double *left, double *x)
 {
-  for (int k = 0; k < c->rows; ++k) x[c->kept[k]] = left[c->number[k]];
-  for (int chain = 0; chain < c->count; chain += PAIR) {
-    double first[3], next[PAIR][3];
-    const int most = most_vertices(c, chain);
-    for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
-      const int32_t *numbers = c->ends + 6 * (chain + l);
-      for (int k = 0; k < 3; ++k) first[k] = left[numbers[k]], next[l][k] = left[numbers[3 + k]];
-      if (c->spike[chain + l]) follow_left_end(c, chain + l, first);
-    }
-    for (int k = 1; k <= most; ++k)
-      for (int l = 0; l < PAIR && chain + l < c->count; ++l) {
-        const int v = c->first[chain + l + 1] - k;
-        double y[3];
-        if (v < c->first[chain + l]) continue;
-        read_vertex(c, c->f, v, y);
-        subtract(c->to_next + BLOCK * v, next[l], y);
-        memcpy(next[l], y, sizeof y);
-        write_vertex(c, y, v, x);
-      }
-  }
+  if (c->unknowns == PLANE) expand_blocks(c, PLANE, left, x);
+  else expand_blocks(c, SPACE, left, x);
 }
 
 int all_finite(int size, const double *values)

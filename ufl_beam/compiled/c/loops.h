@@ -266,24 +266,20 @@ void end_points(points *p, double *sum, int accepts);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 
-/* Size of the blocks stored for a vertex: its pivot block D as LU, and D^-1 times its coupling to
- * the next. */
-enum { BLOCK = 9 };
-
 /* Blocks that couple the first and last vertex of a chain with its ends: rows, then columns. */
 enum end_block { LEFT_FIRST, RIGHT_LAST, FIRST_LEFT, LAST_RIGHT };
 
 typedef struct {
-  int count; /* of chains */
+  int count, unknowns; /* of chains; of a vertex, n: three in the plane, six in space */
   const int32_t *first;     /* first vertex of each chain, and their number */
   const int32_t *spike;     /* whether a chain has a left end */
   const int32_t *dof, *begin; /* of each vertex: first degree of freedom; where its rows begin */
   const uint8_t *at;        /* vertices x 3: where the blocks begin in a row, see beam_elimination.c */
-  const int32_t *with_ends; /* chains x 4 x 9: entries of the blocks that couple with the ends, see
+  const int32_t *with_ends; /* chains x 4 x n x n: entries of the blocks that couple with the ends, see
                              * end_block */
   const double *data;
-  double *pivots, *to_next; /* vertices x BLOCK */
-  uint8_t *swaps;           /* vertices x 3: rows in the order of the pivots */
+  double *pivots, *to_next; /* vertices x n x n: pivot block D as LU; D^-1 times the coupling to the next */
+  uint8_t *swaps;           /* vertices x n: rows in the order of the pivots */
   double *f;                /* D^-1 times the reduced right-hand side, at the degrees of freedom of
                              * vertices */
 
@@ -292,9 +288,9 @@ typedef struct {
   double *left_data, *left_f;
   int left_size;
   const int32_t *entry, *place;  /* indices of the entries that stay: in data, in left_data */
-  const int32_t *places;         /* chains x 36: indices of the blocks of the ends in left_data */
+  const int32_t *places;         /* chains x 4 x n x n: indices of the blocks of the ends in left_data */
   const int32_t *kept, *number;  /* degrees of freedom that stay: in the full system, in the reduced system */
-  const int32_t *ends;           /* chains x 6: degrees of freedom of the ends in the reduced system */
+  const int32_t *ends;           /* chains x 2 n: degrees of freedom of the ends in the reduced system */
 } chains;
 
 void eliminate(const chains *c, const double *b);
