@@ -328,10 +328,13 @@ class Solver:
         worst = self._subdomain.numbering.worst(self._subdomain.gather(residuals))
         places = [f"{size:.1e} N in {place}" for place, size in [*worst.items()][:3]]
         size = lib.over_processes(self.c, lib.HYPOT, float(np.linalg.norm(residuals)))
+        sizes = (
+            f"; residual {size:.3e} N, largest: {', '.join(places) or 'nowhere'}; "
+            f"forces in the scene {self.scale():.3e} N"
+        )
         failure = StepFailed(
             f"Newton's method {REASONS.get(reason, 'was stopped by PETSc')} after "
-            f"{self.c.iterations} iterations; residual {size:.3e} N, largest: "
-            f"{', '.join(places) or 'nowhere'}; forces in the scene {self.scale():.3e} N"
+            f"{self.c.iterations} iterations{sizes if math.isfinite(size) else ''}"
         )
         failure.residuals, failure.reason = worst, str(names.get(reason, reason))
         return failure
