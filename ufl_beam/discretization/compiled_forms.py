@@ -7,6 +7,7 @@ A function is compiled as a form with one quadrature point.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice, product
 from pathlib import Path
@@ -43,8 +44,8 @@ def tabulators(compiled: Any) -> list[Any]:
 def _positions(indptr: Index, indices: Index, dofs: Index, batch_size: int) -> tuple[Index, ...]:
     """Find the places of the entries of cells in a matrix.
 
-    Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns whose
-    entries are adjacent in each row of the matrix come first.
+    Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns come
+    first that have adjacent entries in each row of the matrix: six in the plane, twice six in space.
 
     Returns:
         ``pattern``, ``has`` and ``in_rows`` of the struct ``cells`` of loops.h; if a row of the
@@ -58,9 +59,11 @@ def _positions(indptr: Index, indices: Index, dofs: Index, batch_size: int) -> t
     _, first, has = np.unique(rows, return_index=True, return_inverse=True)
     distinct = places[first]
     in_rows = np.zeros(len(first), dtype=bool)
-    if entries == 36:
-        by_node = distinct.reshape(len(distinct), 6, 6, batch_size)[:, :, [0, 2, 4, 1, 3, 5]]
-        in_rows = (np.diff(by_node, axis=2) == 1).all(axis=(1, 2, 3))
+    if entries in (36, 144):  # of six unknowns in the plane, of twelve in space
+        size = math.isqrt(entries)
+        sixes = np.arange(size).reshape(-1, 2).T.reshape(-1, 6)
+        by_node = distinct.reshape(len(distinct), size, size, batch_size)[:, :, sixes]
+        in_rows = (np.diff(by_node, axis=3) == 1).all(axis=(1, 2, 3, 4))
     order = np.argsort(~in_rows, kind="stable")
     number = np.empty(len(first), dtype=np.int32)
     number[order] = np.arange(len(first))

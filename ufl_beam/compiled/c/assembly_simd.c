@@ -5,36 +5,38 @@
 typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* Do the work of insert_batch for cells with two vertices if the six entries of a row are adjacent,
- * vertex by vertex; a cell has them in the order u u v v ψ ψ. Additions are fewer and wider than
- * for single entries. */
+/* Do the work of insert_batch for cells with two vertices if entries of a row are adjacent, vertex by vertex: all six of a
+ * cell in the plane, the six of each vertex in space. A cell has them in the order u u v v ... Additions are fewer and wider
+ * than for single entries. */
 static inline void insert_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
                                    const uint8_t *pattern, double *b)
 {
   /* Rows of the second vertices come last: adjacent cells add to the same rows, and would wait for
    * each other. */
-  for (int k = 0; k < 6; ++k) {
-    const int i = k % 3 * 2 + k / 3;
-    double *row[LANES];
-    for (int l = 0; l < LANES; ++l)
-      row[l] = b + c->begin[dofs[l * 6 + i]] + pattern[6 * LANES * i + l];
-#define FOUR(j) (*(const four *)((const double *)(e + 6 * i + j) + l))
+  for (int k = 0; k < SIDE; ++k) {
+    const int i = k % (SIDE / 2) * 2 + k / (SIDE / 2);
+    for (int part = 0; part < SIDE / 6; ++part) {
+      double *row[LANES];
+      for (int l = 0; l < LANES; ++l)
+        row[l] = b + c->begin[dofs[l * SIDE + i]] + pattern[LANES * (SIDE * i + part) + l];
+#define FOUR(j) (*(const four *)((const double *)(e + SIDE * i + (part * 6 + (j)) % (SIDE / 2) * 2 + (part * 6 + (j)) / (SIDE / 2)) + l))
 #define EVEN(a, b) __builtin_shufflevector(a, b, 0, 4, 2, 6)
 #define ODD(a, b) __builtin_shufflevector(a, b, 1, 5, 3, 7)
 #define LOWER(a, b) __builtin_shufflevector(a, b, 0, 1, 4, 5)
 #define UPPER(a, b) __builtin_shufflevector(a, b, 2, 3, 6, 7)
-    for (int l = 0; l < LANES; l += 4) {
-      const four u = EVEN(FOUR(0), FOUR(2)), U = ODD(FOUR(0), FOUR(2));
-      const four v = EVEN(FOUR(4), FOUR(1)), V = ODD(FOUR(4), FOUR(1));
-      const four w = EVEN(FOUR(3), FOUR(5)), W = ODD(FOUR(3), FOUR(5));
-      *(four *)row[l] += LOWER(u, v);
-      *(four *)row[l + 1] += LOWER(U, V);
-      *(four *)row[l + 2] += UPPER(u, v);
-      *(four *)row[l + 3] += UPPER(U, V);
-      *(two *)(row[l] + 4) += __builtin_shufflevector(w, w, 0, 1);
-      *(two *)(row[l + 1] + 4) += __builtin_shufflevector(W, W, 0, 1);
-      *(two *)(row[l + 2] + 4) += __builtin_shufflevector(w, w, 2, 3);
-      *(two *)(row[l + 3] + 4) += __builtin_shufflevector(W, W, 2, 3);
+      for (int l = 0; l < LANES; l += 4) {
+        const four u = EVEN(FOUR(0), FOUR(1)), U = ODD(FOUR(0), FOUR(1));
+        const four v = EVEN(FOUR(2), FOUR(3)), V = ODD(FOUR(2), FOUR(3));
+        const four w = EVEN(FOUR(4), FOUR(5)), W = ODD(FOUR(4), FOUR(5));
+        *(four *)row[l] += LOWER(u, v);
+        *(four *)row[l + 1] += LOWER(U, V);
+        *(four *)row[l + 2] += UPPER(u, v);
+        *(four *)row[l + 3] += UPPER(U, V);
+        *(two *)(row[l] + 4) += __builtin_shufflevector(w, w, 0, 1);
+        *(two *)(row[l + 1] + 4) += __builtin_shufflevector(W, W, 0, 1);
+        *(two *)(row[l + 2] + 4) += __builtin_shufflevector(w, w, 2, 3);
+        *(two *)(row[l + 3] + 4) += __builtin_shufflevector(W, W, 2, 3);
+      }
     }
 #undef FOUR
 #undef EVEN
@@ -53,7 +55,7 @@ static inline void insert_batch(const cells *c, const lanes *e, int first, int s
   if (c->pattern) {
     const int has = c->has[first / LANES];
     const uint8_t *pattern = c->pattern + (size_t)has * ENTRIES * LANES;
-    if (SIDE == 6 && some == LANES && has < c->in_rows) {
+    if ((SIDE == 6 || SIDE == 12) && some == LANES && has < c->in_rows) {
       insert_rows_of_six(c, e, dofs, pattern, b);
       return;
     }

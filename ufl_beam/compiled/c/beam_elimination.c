@@ -326,129 +326,179 @@ static void eliminate_in_plane(const chains *c, const double *b)
   }
 }
 
-/* -- in space: rows of a chain ----------------------------------------------------------------- */
+/* -- in space: rows of six numbers, of two chains in turn --------------------------------------- */
 
-/* A row of six numbers. */
-typedef double octet __attribute__((vector_size(64), aligned(8), may_alias));
+typedef double octet __attribute__((vector_size(64), may_alias));
 
-/* Rows [A | B | C] become [LU | L^-1 B | L^-1 C], with column pivoting, as factor_rows does. */
-static inline void factor_six(octet *A, octet *B, octet *C, uint8_t *swap, const int spike)
+/* A chain during elimination. Rows of the vertex: pivot block, coupling to the next vertex and right-hand side, coupling to
+ * the left end. Then modified rows of the next vertex and of the left end; those of an end with its right-hand side. */
+typedef struct {
+  int chain, vertex, last;
+  octet pivot[6], after[6], to[6], next[6], next_to[6], from[6], left[6];
+  double low[36], over[6], faded;
+  uint8_t swap[6];
+} rows_of_six;
+
+enum { F = 6 }; /* column of right-hand sides */
+
+static inline octet six(const double *x) { return (octet){x[0], x[1], x[2], x[3], x[4], x[5]}; }
+
+/* Pivot block k becomes LU, and the other columns L^-1 times them, with column pivoting, as factor_rows does. L is in `low`,
+ * the reciprocals of the pivots are in `over`. Numbers of rows are not changed: vectors that are partly new take long to load. */
+static inline void eliminate_column(rows_of_six *at, const int k, const int spike)
 {
-#define EXCHANGE(x, y) do { const octet old = x; x = y, y = old; } while (0)
-  for (int k = 0; k < 6; ++k) swap[k] = (uint8_t)k;
-  for (int k = 0; k < 6; ++k) {
-    int largest = k;
-    for (int i = k + 1; i < 6; ++i)
-      if (fabs(A[i][k]) > fabs(A[largest][k])) largest = i;
-    if (largest != k) {
-      EXCHANGE(A[k], A[largest]);
-      EXCHANGE(B[k], B[largest]);
-      if (spike) EXCHANGE(C[k], C[largest]);
-      const uint8_t old = swap[k];
-      swap[k] = swap[largest], swap[largest] = old;
-    }
-    const double reciprocal = 1 / A[k][k]; /* not finite for a singular block, and so are the results */
-    octet later = A[k];
-    for (int j = 0; j <= k; ++j) later[j] = 0;
-    A[k][k] = reciprocal;
-    for (int i = k + 1; i < 6; ++i) {
-      const double part = A[i][k] * reciprocal;
-      A[i] -= part * later;
-      A[i][k] = part;
-      B[i] -= part * B[k];
-      if (spike) C[i] -= part * C[k];
-    }
-  }
+  octet *A = at->pivot, *B = at->after, *C = at->to;
+  int largest = k;
+  for (int i = k + 1; i < 6; ++i)
+    if (fabs(A[i][k]) > fabs(A[largest][k])) largest = i;
+  if (largest != k) {
+#define EXCHANGE(type, x) do { const type old = (x)[k]; (x)[k] = (x)[largest], (x)[largest] = old; } while (0)
+    EXCHANGE(octet, A);
+    EXCHANGE(octet, B);
+    if (spike) EXCHANGE(octet, C);
+    EXCHANGE(uint8_t, at->swap);
+    for (int j = 0; j < k; ++j) EXCHANGE(double, at->low + 6 * j);
 #undef EXCHANGE
-}
-
-/* The transpose of A becomes that of A U^-1. */
-static inline void divide_six(const octet *LU, octet *A)
-{
-  for (int k = 0; k < 6; ++k) {
-    for (int j = 0; j < k; ++j) A[k] -= LU[j][k] * A[j];
-    A[k] *= LU[k][k];
+  }
+  const double over = at->over[k] = 1 / A[k][k]; /* not finite for a singular block, and so are the results */
+  for (int i = k + 1; i < 6; ++i) {
+    const double part = at->low[6 * k + i] = A[i][k] * over;
+    A[i] -= part * A[k];
+    B[i] -= part * B[k];
+    if (spike) C[i] -= part * C[k];
   }
 }
 
-/* Y -= A X for `rows` rows of Y, from the transpose of A; subtracts the latest results last */
-static inline void subtract_six(const int rows, const octet *A, const octet *X, octet *Y)
+/* L^-1 B becomes D^-1 B. */
+static inline void solve_six(const rows_of_six *at, octet *B)
 {
-  for (int i = 0; i < rows; ++i)
-    for (int k = 0; k < 6; ++k) Y[i] -= A[k][i] * X[k];
+  for (int k = 5; k >= 0; --k) {
+    for (int j = k + 1; j < 6; ++j) B[k] -= at->pivot[k][j] * B[j];
+    B[k] *= at->over[k];
+  }
+}
+
+/* Y -= A X, from the latest rows to the first */
+static inline void subtract_six(const double *A, int far, const octet *X, octet *Y)
+{
+  for (int i = 0; i < 6; ++i)
+    for (int k = 0; k < 6; ++k) Y[i] -= A[far * i + k] * X[k];
+}
+
+static inline double largest_of_six(const octet *block)
+{
+  double largest = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int k = 0; k < 6; ++k) largest = fmax(largest, fabs(block[i][k]));
+  return largest;
 }
 
 /* As drop_faded does. */
 static inline void drop_faded_six(octet *block, double faded)
 {
   for (int i = 0; i < 6; ++i)
-    for (int k = 0; k < 6; ++k)
+    for (int k = 0; k < 8; ++k)
       if (fabs(block[i][k]) < faded) block[i][k] = 0;
 }
 
-/* Eliminate the vertices of a chain from the matrix and from the right-hand side b. Columns 6 of `next` and row 6 of `from`
- * are right-hand sides. */
-static inline void eliminate_in_space(const chains *c, int chain, const double *b, const int spike)
+static inline void begin_six(const chains *c, rows_of_six *at, int chain)
 {
-  enum { FAR = 8, F = 6 };
-  const int begin = c->first[chain], end = c->first[chain + 1];
-  octet A[6], B[6], C[6], below[6], next[6] = {0}, to[6] = {0}, from[7] = {0}, left[6] = {0};
-  double faded = 0;
-  read_block(c, 6, begin, 1, spike ? 18 : 12, (double *)next, FAR, 1);
-  if (spike) {
-    read_block_of_end(c, 6, chain, FIRST_LEFT, (double *)to, FAR, 1);
-    read_block_of_end(c, 6, chain, LEFT_FIRST, (double *)from, 1, FAR);
-    for (int k = 0; k < 48; ++k) faded = fmax(faded, fabs(((double *)to)[k]));
-    double largest = 0;
-    for (int k = 0; k < 48; ++k) largest = fmax(largest, fabs(((double *)from)[k]));
-    faded = 0x1p-511 * fmin(faded, largest);
+  memset(at, 0, sizeof *at);
+  at->chain = chain, at->vertex = c->first[chain], at->last = c->first[chain + 1] - 1;
+  read_block(c, 6, at->vertex, 1, c->spike[chain] ? 18 : 12, (double *)at->next, 8, 1);
+  if (!c->spike[chain]) return;
+  read_block_of_end(c, 6, chain, FIRST_LEFT, (double *)at->next_to, 8, 1);
+  read_block_of_end(c, 6, chain, LEFT_FIRST, (double *)at->from, 8, 1);
+  at->faded = 0x1p-511 * fmin(largest_of_six(at->next_to), largest_of_six(at->from));
+}
+
+/* Add the Schur complement of a chain as end_chain does. */
+static inline void end_six(const chains *c, const rows_of_six *at)
+{
+  const int32_t *place = c->places + 4 * 36 * at->chain, *numbers = c->ends + 12 * at->chain;
+  const octet *blocks[] = {at->left, at->from, at->next_to, at->next};
+  for (int i = 0; i < 4; ++i)
+    for (int r = 0; r < 6; ++r)
+      for (int k = 0; k < 6; ++k) c->left_data[*place++] += blocks[i][r][k];
+  for (int r = 0; r < 6; ++r) {
+    c->left_f[numbers[r]] += at->from[r][F];
+    c->left_f[numbers[6 + r]] += at->next[r][F];
   }
-  memset(below, 0, sizeof below), memset(B, 0, sizeof B);
-  for (int v = begin; v < end; ++v) {
-    uint8_t *swap = c->swaps + 6 * v;
-    double *pivot = c->pivots + 36 * v, *to_next = c->to_next + 36 * v, *f = c->f + c->dof[v];
-    memcpy(A, next, sizeof A);
-    if (spike) memcpy(C, to, sizeof C);
-    read_after(c, 6, chain, v, spike || v > begin ? 18 : 12, (double *)B, FAR, 1);
-    for (int r = 0; r < 6; ++r) B[r][F] = next[r][F] + b[c->dof[v] + r];
-    factor_six(A, B, C, swap, spike);
-    read_below(c, 6, chain, v, (double *)below, 1, FAR);
-    divide_six(A, below);
-    memset(next, 0, sizeof next);
-    if (v + 1 < end) read_block(c, 6, v + 1, 1, 18, (double *)next, FAR, 1);
-    subtract_six(6, below, B, next);
-    if (spike) {
-      memset(to, 0, sizeof to);
-      divide_six(A, from);
-      subtract_six(6, below, C, to);
-      subtract_six(6, from, C, left);
-      octet old[6];
-      memcpy(old, from, sizeof old);
-      memset(from, 0, sizeof old);
-      subtract_six(7, B, old, from);
-      drop_faded_six(to, faded), drop_faded_six(from, faded);
+}
+
+/* Eliminate the next vertices of chains from the matrix and from the right-hand side b. `spike`: a chain has a left end. */
+static inline void eliminate_six(const chains *c, rows_of_six *at, int number, const double *b, const int spike)
+{
+  for (rows_of_six *x = at; x < at + number; ++x) {
+    const int v = x->vertex, width = v > c->first[x->chain] || c->spike[x->chain] ? 18 : 12;
+    const double *row = c->data + c->begin[v] + c->at[3 * v + 2];
+    octet right[6];
+    if (v == x->last) read_block_of_end(c, 6, x->chain, LAST_RIGHT, (double *)right, 8, 1);
+    for (int r = 0; r < 6; ++r) {
+      const octet after = v < x->last ? six(row + width * r) : right[r];
+      x->after[r] = (octet){after[0], after[1], after[2], after[3], after[4], after[5], x->next[r][F] + b[c->dof[v] + r]};
+      x->pivot[r] = x->next[r], x->swap[r] = (uint8_t)r;
+      if (spike) x->to[r] = x->next_to[r];
     }
-    for (int k = 5; k >= 0; --k) {
-      for (int j = k + 1; j < 6; ++j) B[k] -= A[k][j] * B[j];
-      B[k] *= A[k][k];
+  }
+#pragma GCC unroll 6
+  for (int k = 0; k < 6; ++k)
+    for (rows_of_six *x = at; x < at + number; ++x) eliminate_column(x, k, spike);
+  for (rows_of_six *x = at; x < at + number; ++x) {
+    solve_six(x, x->after);
+    if (spike) solve_six(x, x->to);
+  }
+  for (rows_of_six *x = at; x < at + number; ++x) {
+    const int v = x->vertex, inside = v < x->last;
+    double end[36], *pivot = c->pivots + 36 * v, *to_next = c->to_next + 36 * v, *f = c->f + c->dof[v];
+    const double *row = c->data + c->begin[v + inside], *below = inside ? row + c->at[3 * (v + 1)] : end;
+    if (inside) row += c->at[3 * (v + 1) + 1];
+    else read_block_of_end(c, 6, x->chain, RIGHT_LAST, end, 6, 1);
+    for (int r = 0; r < 6; ++r) x->next[r] = inside ? six(row + 18 * r) : (octet){0};
+    subtract_six(below, inside ? 18 : 6, x->after, x->next);
+    if (spike) {
+      octet from[6] = {0};
+      memset(x->next_to, 0, sizeof x->next_to);
+      subtract_six(below, inside ? 18 : 6, x->to, x->next_to);
+      subtract_six((double *)x->from, 8, x->to, x->left);
+      for (int r = 0; r < 6; ++r) from[r][F] = x->from[r][F];
+      subtract_six((double *)x->from, 8, x->after, from);
+      memcpy(x->from, from, sizeof from);
+      drop_faded_six(x->next_to, x->faded), drop_faded_six(x->from, x->faded);
     }
     for (int r = 0; r < 6; ++r) {
-      f[r] = B[r][F];
-      for (int k = 0; k < 6; ++k) pivot[6 * r + k] = A[r][k], to_next[6 * r + k] = B[r][k];
+      f[r] = x->after[r][F], c->swaps[6 * v + r] = x->swap[r];
+      for (int k = 0; k < 6; ++k) {
+        pivot[6 * r + k] = k < r ? x->low[6 * k + r] : k > r ? x->pivot[r][k] : x->over[r];
+        to_next[6 * r + k] = x->after[r][k];
+      }
     }
+    ++x->vertex;
   }
-  const int32_t *place = c->places + 4 * 36 * chain, *numbers = c->ends + 12 * chain;
-  for (int r = 0; r < 6; ++r)
-    for (int k = 0; k < 6; ++k) {
-      const int32_t *at = place + 6 * r + k;
-      c->left_data[at[0]] += left[r][k];
-      c->left_data[at[36]] += from[k][r];
-      c->left_data[at[72]] += to[r][k];
-      c->left_data[at[108]] += next[r][k];
+}
+
+/* Eliminate all vertices of scenes in space. */
+static void eliminate_in_space(const chains *c, const double *b)
+{
+  rows_of_six at[PAIR];
+  int next = 0, number = 0;
+  for (;;) {
+    for (; number < PAIR && next < c->count; ++next, ++number) begin_six(c, at + number, next);
+    if (!number) return;
+    int spike = 0, both = INT32_MAX;
+    for (int l = 0; l < number; ++l) {
+      const int to_go = at[l].last + 1 - at[l].vertex;
+      spike |= c->spike[at[l].chain], both = to_go < both ? to_go : both;
     }
-  for (int k = 0; k < 6; ++k) {
-    c->left_f[numbers[k]] += from[F][k];
-    c->left_f[numbers[6 + k]] += next[k][F];
+    for (; both; --both)
+      if (spike) eliminate_six(c, at, number, b, 1);
+      else if (number == PAIR) eliminate_six(c, at, PAIR, b, 0);
+      else eliminate_six(c, at, 1, b, 0);
+    for (int l = number - 1; l >= 0; --l)
+      if (at[l].vertex > at[l].last) {
+        end_six(c, at + l);
+        if (l < --number) at[l] = at[number];
+      }
   }
 }
 
@@ -463,10 +513,7 @@ void eliminate(const chains *c, const double *b)
   for (int k = 0; k < c->stay; ++k) c->left_data[c->place[k]] = c->data[c->entry[k]];
   for (int k = 0; k < c->rows; ++k) c->left_f[c->number[k]] = b[c->kept[k]];
   if (c->unknowns == PLANE) eliminate_in_plane(c, b);
-  else
-    for (int chain = 0; chain < c->count; ++chain)
-      if (c->spike[chain]) eliminate_in_space(c, chain, b, 1);
-      else eliminate_in_space(c, chain, b, 0);
+  else eliminate_in_space(c, b);
 }
 
 static inline void read_vertex(const chains *c, const int n, const double *f, int vertex, double *y)
