@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -50,11 +51,11 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
     blocks = np.zeros((n, 6, 6))
     blocks[:, range(3), range(3)] = fields.section_values("rhoA")
     blocks[:, 3:, 3:] = rotary_inertia(fields, axes)
-    shares = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6
-    cells = np.einsum("n,ab,nij->niajb", lengths, shares, blocks).reshape(n, 12, 12)
-    dofs = fields.cell_dofs
-    rows, columns = (np.broadcast_to(x, cells.shape) for x in (dofs[:, :, None], dofs[:, None, :]))
-    np.add.at(A.data, A.positions(rows.ravel(), columns.ravel()), cells.ravel())
+    for a, b in product((0, 1), repeat=2):
+        entries = (lengths / (3 if a == b else 6))[:, None, None] * blocks
+        dofs = fields.cell_dofs[:, a::2, None], fields.cell_dofs[:, None, b::2]
+        rows, columns = (x.ravel() for x in np.broadcast_arrays(*dofs))
+        np.add.at(A.data, A.positions(rows, columns), entries.ravel())
     for body in fields.subdomain.numbering.scene.bodies:
         own = fields.subdomain.local(fields.subdomain.numbering.node(body.middle))
         inertia = np.zeros((6, 6))
