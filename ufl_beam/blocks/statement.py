@@ -177,7 +177,7 @@ class Inputs(dict[str, Expr]):
         while left:
             k = left[0]
             if len(stages) > MANY:
-                k = min(left, key=lambda k: len(rows[m + k]) * sum(n + k in row for row in rows))
+                k = min(left, key=lambda k: _products(rows[m + k], [x for x in rows if n + k in x]))
             left.remove(k)
             inner, rows[m + k] = rows[m + k], {}
             for row, first in zip(rows, used, strict=True):
@@ -599,6 +599,12 @@ def expanded(outputs: Sequence[Expr]) -> list[Expr]:
 def without_zeros(outputs: list[Expr]) -> list[Expr]:
     """Return expressions, or none if all are zero."""
     return [] if all(isinstance(x, Zero) for x in outputs) else outputs
+
+
+def _products(inner: dict[int, Expr], outer: list[dict[int, Expr]]) -> int:
+    """Return the number of products that eliminate a number, and four for each new derivative."""
+    new = sum(j not in row for row in outer for j in inner) - len(inner) - len(outer)
+    return len(inner) * len(outer) + 4 * new
 
 
 def _slopes(outputs: Sequence[Expr], by: Sequence[Expr]) -> list[Expr]:

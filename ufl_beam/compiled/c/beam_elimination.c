@@ -360,29 +360,38 @@ static inline void eliminate_column(rows_of_six *at, const int k, const int spik
     for (int j = 0; j < k; ++j) EXCHANGE(double, at->low + 6 * j);
 #undef EXCHANGE
   }
+  const octet a = A[k], b = B[k], c = C[k];
   const double over = at->over[k] = 1 / A[k][k]; /* not finite for a singular block, and so are the results */
   for (int i = k + 1; i < 6; ++i) {
     const double part = at->low[6 * k + i] = A[i][k] * over;
-    A[i] -= part * A[k];
-    B[i] -= part * B[k];
-    if (spike) C[i] -= part * C[k];
+    A[i] -= part * a;
+    B[i] -= part * b;
+    if (spike) C[i] -= part * c;
   }
 }
 
 /* L^-1 B becomes D^-1 B. */
 static inline void solve_six(const rows_of_six *at, octet *B)
 {
-  for (int k = 5; k >= 0; --k) {
-    for (int j = k + 1; j < 6; ++j) B[k] -= at->pivot[k][j] * B[j];
-    B[k] *= at->over[k];
+  octet b[6];
+  for (int k = 0; k < 6; ++k) b[k] = B[k];
+  for (int j = 5; j >= 0; --j) {
+    b[j] *= at->over[j];
+    for (int k = 0; k < j; ++k) b[k] -= at->pivot[k][j] * b[j];
   }
+  for (int k = 0; k < 6; ++k) B[k] = b[k];
 }
 
-/* Y -= A X, from the latest rows to the first */
+/* Y -= A X */
 static inline void subtract_six(const double *A, int far, const octet *X, octet *Y)
 {
-  for (int i = 0; i < 6; ++i)
-    for (int k = 0; k < 6; ++k) Y[i] -= A[far * i + k] * X[k];
+  octet x[6];
+  for (int k = 0; k < 6; ++k) x[k] = X[k];
+  for (int i = 0; i < 6; ++i, A += far) {
+    octet y = Y[i];
+    for (int k = 0; k < 6; ++k) y -= A[k] * x[k];
+    Y[i] = y;
+  }
 }
 
 static inline double largest_of_six(const octet *block)
