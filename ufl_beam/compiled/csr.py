@@ -134,38 +134,49 @@ def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
 
 
 @cached_by_structure
-def _runs(nonzero: Index, indptr: Index, indices: Index) -> tuple[Index, ...]:
+def _runs(nonzero: Index, indptr: Index, indices: Index, period: int) -> tuple[Index, ...]:
     """Find runs of rows, see :class:`Product`, of a matrix with the entries ``nonzero``.
 
     Returns:
-        The first row of each run, and last the number of rows; the distances of the runs from the
-        diagonal; the number of rows, and of distances, of each run; the index of the first entry of
-        each run.
+        The first row of each run, and last the number of rows; the first row of each strip; the
+        number of rows, and of entries in each row, of each strip; the distances of the strips from
+        the diagonal.
     """
     size, begin = len(indptr) - 1, np.searchsorted(nonzero, indptr).astype(np.int32)
     width = np.diff(begin)
-    row = np.repeat(np.arange(size, dtype=np.int32), width)
-    away = indices[nonzero] - row
-    begins = np.ones(size, dtype=bool)
+    away = indices[nonzero] - np.repeat(np.arange(size, dtype=np.int32), width)
+    alike = np.zeros(size, dtype=bool)
     for number in np.unique(width):
         rows = np.flatnonzero(width == number).astype(np.int32)
         distances = away[begin[rows, None] + np.arange(number, dtype=np.int32)]
-        alike = (distances[1:] == distances[:-1]).all(axis=1) & (np.diff(rows) == 1)
-        begins[rows[1:][alike]] = False
-    first = np.flatnonzero(begins)
-    after = np.append(first, size).astype(np.int32)
-    return after, away[begins[row]], np.diff(after), width[first], begin[first]
+        before = np.searchsorted(rows, rows - period)
+        same = (rows[before] == rows - period) & (distances[before] == distances).all(axis=1)
+        alike[rows[same]] = True
+    starts = np.flatnonzero(~alike)
+    if period > 1:
+        later = [-period]
+        for row in map(int, starts):
+            if row >= later[-1] + period:
+                later.append(row)
+        starts = np.array(later[1:], dtype=np.int64)
+    first = np.append(starts, size).astype(np.int32)
+    head = (first[:-1, None] + np.arange(period, dtype=np.int32)).ravel()
+    rows = np.maximum(0, (np.repeat(first[1:], period) - head + period - 1) // period)
+    heads = np.zeros(size, dtype=bool)
+    heads[head[rows > 0]] = True
+    widths = np.where(rows > 0, width[np.minimum(head, size - 1)], 0)
+    return first, head, rows, widths, away[np.repeat(heads, width)]
 
 
 @cached_by_structure
 def _places(
-    first: Index, away: Index, rows: Index, widths: Index, indptr: Index, indices: Index
+    head: Index, rows: Index, widths: Index, away: Index, period: int, indptr: Index, indices: Index
 ) -> tuple[Index, ...]:
     """Find the entries of :func:`_runs` in a matrix; see :meth:`Product.places`."""
     each = np.repeat(rows, widths)
     before = np.cumsum(each) - each
-    begin = np.repeat(first[:-1], widths)
-    row = np.arange(each.sum(), dtype=np.int32) + np.repeat(begin - before, each)
+    row = period * (np.arange(each.sum(), dtype=np.int32) - np.repeat(before, each))
+    row += np.repeat(np.repeat(head, widths), each)
     places = Csr(np.empty(0), indices, indptr).positions(row, row + np.repeat(away, each))
     return places, places - indptr[row]
 
@@ -173,18 +184,26 @@ def _places(
 class Product:
     """Operator ``x -> A x`` on this process, which leaves out the stored zeros of ``A``.
 
-    Successive rows whose entries have the same distances from the diagonal form a run, which stores
-    the distances once.  Most rows along beams are in such runs.
+    Rows whose entries have the same distances from the diagonal form a strip, which stores the
+    distances once.  Most rows along beams are in long strips: each row is like the one before, or
+    in space like the row of the same motion of the vertex before.  A run has as many strips.
     """
 
     def __init__(self, A: Csr) -> None:
         nonzero = np.flatnonzero(A.data).astype(np.int32)
-        *self._runs, at = _runs(nonzero, A.indptr, A.indices)
-        first, away, _, widths = self._runs
+        structure = nonzero, A.indptr, A.indices
+        period, runs = 1, _runs(*structure, 1)
+        if len(runs[1]) > max(16, A.size // 8):
+            tried = [(1, runs), (6, _runs(*structure, 6))]
+            period, runs = min(tried, key=lambda x: len(x[1][1]))
+        first, *self._strips = runs
+        _, rows, widths, away = self._strips
+        self._period = period
         self.data = A.data[self.places(A)[0]]
         self.c = struct(
-            "constant_matrix", runs=len(widths), first=first, away=away,
-            begin=np.append(0, np.cumsum(widths)).astype(np.int32), at=at, data=self.data,
+            "constant_matrix", runs=len(first) - 1, period=period, first=first, away=away,
+            begin=np.append(0, np.cumsum(widths)).astype(np.int32), data=self.data,
+            at=np.append(0, np.cumsum(rows * widths)).astype(np.int32),
         )  # fmt: skip
 
     def places(self, A: Csr) -> tuple[Index, ...]:
@@ -192,7 +211,7 @@ class Product:
 
         The entries have the order of :attr:`data`.  ``A`` must have these entries.
         """
-        return _places(*self._runs, A.indptr, A.indices)
+        return _places(*self._strips, self._period, A.indptr, A.indices)
 
     def __call__(self, x: Array) -> Array:
         """Return the product in a new array."""

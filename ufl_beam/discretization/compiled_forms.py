@@ -45,7 +45,7 @@ def _positions(indptr: Index, indices: Index, dofs: Index, batch_size: int) -> t
     """Find the places of the entries of cells in a matrix.
 
     Batches of cells with equal positions share a pattern.  With cells of degree 1, patterns come
-    first that have adjacent entries in each row of the matrix: six in the plane, twice six in space.
+    first whose entries in a row of the matrix are adjacent: six in the plane, twice six in space.
 
     Returns:
         ``pattern``, ``has`` and ``in_rows`` of the struct ``cells`` of loops.h; if a row of the

@@ -83,36 +83,53 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
   return number;
 }
 
-/* Expand CALL for the number of entries of a row. The compiler knows the usual numbers: one for
- * lumped masses, three for consistent masses. */
-#define FOR_WIDTH(width, CALL) \
-  switch (width) { \
-  case 1: CALL(1); break; \
-  case 3: CALL(3); break; \
-  default: CALL(width); \
+/* Expand CALL for the number of entries of a row, and the distance between rows. The compiler knows the usual ones: one entry
+ * for lumped masses, three for consistent masses; in space six and nine for rotary inertia. */
+#define FOR_STRIP(width, period, CALL) \
+  if ((period) == 1) switch (width) { \
+  case 1: CALL(1, 1); break; \
+  case 3: CALL(3, 1); break; \
+  default: CALL(width, 1); \
+  } else switch (width) { \
+  case 3: CALL(3, 6); break; \
+  case 6: CALL(6, 6); break; \
+  case 9: CALL(9, 6); break; \
+  default: CALL(width, period); \
   }
 
-/* y += A x in a run of rows; data, x and y begin at its first row */
-static inline void add_rows_times(const int width, int rows, const double *data, const int32_t *away,
-                                  const double *x, double *restrict y)
+/* Number of rows of a strip of a run. */
+static inline int rows_of_strip(const constant_matrix *A, int run, int strip)
 {
-  for (int i = 0; i < rows; ++i) {
+  return (A->first[run + 1] - A->first[run] - strip + A->period - 1) / A->period;
+}
+
+/* y += A x in rows of a strip; data, x and y begin at its first row */
+static inline void add_strip_times(const int width, const int period, int from, int to, int rows,
+                                   const double *data, const int32_t *away, const double *x, double *restrict y)
+{
+  for (int i = from; i < to; ++i) {
     double sum = 0;
-    for (int k = 0; k < width; ++k) sum += data[(size_t)k * rows + i] * x[i + away[k]];
-    y[i] += sum;
+    for (int k = 0; k < width; ++k) sum += data[(size_t)k * rows + i] * x[period * i + away[k]];
+    y[period * i] += sum;
   }
 }
 
-/* y += A x */
+/* y += A x; the strips of a run are in the cache together */
 void add_product(const constant_matrix *A, const double *x, double *y)
 {
+  enum { CHUNK = 64 };
   for (int g = 0; g < A->runs; ++g) {
-    const int first = A->first[g], rows = A->first[g + 1] - first;
-    const int32_t *away = A->away + A->begin[g];
-    const double *data = A->data + A->at[g];
-#define ADD(width) add_rows_times(width, rows, data, away, x + first, y + first)
-    FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD)
+    const int all = rows_of_strip(A, g, 0), chunk = A->period == 1 ? all : CHUNK;
+    for (int from = 0; from < all; from += chunk)
+      for (int r = 0; r < A->period; ++r) {
+        const int s = g * A->period + r, first = A->first[g] + r, rows = rows_of_strip(A, g, r);
+        const int to = from + chunk < rows ? from + chunk : rows;
+        const int32_t *away = A->away + A->begin[s];
+        const double *data = A->data + A->at[s];
+#define ADD(width, period) add_strip_times(width, period, from, to, rows, data, away, x + first, y + first)
+        FOR_STRIP(A->begin[s + 1] - A->begin[s], A->period, ADD)
 #undef ADD
+      }
   }
 }
 
@@ -122,8 +139,12 @@ double norm(int rows, const int32_t *at, const double *w, const double *f)
 {
   double sum = 0, largest = 0, scaled = 0;
 #define W(i) w[at ? at[i] : i]
+  if (at)
 #pragma omp simd reduction(+ : sum)
-  for (int i = 0; i < rows; ++i) sum += W(i) * f[i] * (W(i) * f[i]);
+    for (int i = 0; i < rows; ++i) sum += W(i) * f[i] * (W(i) * f[i]);
+  else
+#pragma omp simd reduction(+ : sum)
+    for (int i = 0; i < rows; ++i) sum += w[i] * f[i] * (w[i] * f[i]);
   if (isnan(sum) || (1e-250 < sum && sum < 1e250)) return sqrt(sum);
   for (int i = 0; i < rows; ++i) largest = fmax(largest, W(i) * fabs(f[i]));
   if (largest == 0 || !isfinite(largest)) return largest;

@@ -45,24 +45,26 @@ static void add_rows(const step_product *p, int first, int last, double *tangent
     if (A->first[middle] <= first) g = middle;
     else end = middle;
   }
-  for (; first < last; ++g) {
-    const int rows = A->first[g + 1] - A->first[g];
-    const int end = A->first[g + 1] < last ? A->first[g + 1] : last;
-    const int32_t *away = A->away + A->begin[g];
-    const int64_t at = A->at[g] - A->first[g]; /* where row 0 would be in this run */
-#define ADD(width, place) \
-  for (; first < end; ++first) \
+  for (; g < A->runs && A->first[g] < last; ++g)
+    for (int r = 0; r < A->period; ++r) {
+      const int s = g * A->period + r, begin = A->first[g] + r, rows = rows_of_strip(A, g, r);
+      const int from = first > begin ? (first - begin + A->period - 1) / A->period : 0;
+      const int before = (last - begin + A->period - 1) / A->period, to = before < rows ? before : rows;
+      const int32_t *away = A->away + A->begin[s];
+      const int64_t at = A->at[s];
+#define ADD(width, period, place) \
+  for (int i = from, row = begin + from * (period); i < to; ++i, row += (period)) \
     for (int k = 0; k < (width); ++k) \
-      tangent[p->begin[first] + place[at + (int64_t)k * rows + first]] += \
-        A->data[at + (int64_t)k * rows + first] * p->space[first + away[k]]
-#define ADD_NEAR(width) ADD(width, p->place)
-#define ADD_FAR(width) ADD(width, p->far)
-    if (p->place) FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD_NEAR)
-    else FOR_WIDTH(A->begin[g + 1] - A->begin[g], ADD_FAR)
+      tangent[p->begin[row] + (place)[at + (int64_t)k * rows + i]] += \
+        A->data[at + (int64_t)k * rows + i] * p->space[row + away[k]]
+#define ADD_NEAR(width, period) ADD(width, period, p->place)
+#define ADD_FAR(width, period) ADD(width, period, p->far)
+      if (p->place) FOR_STRIP(A->begin[s + 1] - A->begin[s], A->period, ADD_NEAR)
+      else FOR_STRIP(A->begin[s + 1] - A->begin[s], A->period, ADD_FAR)
 #undef ADD
 #undef ADD_NEAR
 #undef ADD_FAR
-  }
+    }
 }
 
 void add_step_tangent(void *self, const double *q, double *tangent)

@@ -61,14 +61,14 @@ typedef struct {
   const double *values;
 } vector;
 
-/* A constant matrix, stored by runs of rows whose entries have the same distances from the
- * diagonal. */
+/* A constant matrix, stored by runs of rows. In a run, the entries of each row have the same distances from the diagonal as
+ * those of the row `period` before. These rows form a strip; each run has `period` strips in turn, some perhaps empty. */
 typedef struct {
-  int runs;
+  int runs, period;
   const int32_t *first;        /* first row of each run, then the number of rows */
-  const int32_t *begin, *away; /* begin: range of each run in `away`, the columns less the row */
-  const int32_t *at;           /* where the entries of each run begin in `data` */
-  const double *data;          /* first entry of each row of the run, then the second ones, and so on */
+  const int32_t *begin, *away; /* begin: range of each strip in `away`, the columns less the row */
+  const int32_t *at;           /* where the entries of each strip begin in `data` */
+  const double *data;          /* first entry of each row of the strip, then the second ones, and so on */
 } constant_matrix;
 
 /* A constant matrix A times the step s of the nodes from q0, see StepProduct. */
