@@ -329,6 +329,7 @@ static void eliminate_in_plane(const chains *c, const double *b)
 /* -- in space: rows of six numbers, of two chains in turn --------------------------------------- */
 
 typedef double octet __attribute__((vector_size(64), may_alias));
+typedef int64_t eight __attribute__((vector_size(64), may_alias));
 
 /* A chain during elimination. Rows of the vertex: pivot block, coupling to the next vertex and right-hand side, coupling to
  * the left end. Then modified rows of the next vertex and of the left end; those of an end with its right-hand side. */
@@ -402,12 +403,14 @@ static inline double largest_of_six(const octet *block)
   return largest;
 }
 
-/* As drop_faded does. */
+/* As drop_faded does, but not to right-hand sides. */
 static inline void drop_faded_six(octet *block, double faded)
 {
-  for (int i = 0; i < 6; ++i)
-    for (int k = 0; k < 8; ++k)
-      if (fabs(block[i][k]) < faded) block[i][k] = 0;
+  const eight others = {0, 0, 0, 0, 0, 0, -1, -1};
+  for (int i = 0; i < 6; ++i) {
+    const eight x = (eight)block[i];
+    block[i] = (octet)(x & ((eight)((octet)(x & INT64_MAX) >= faded) | others));
+  }
 }
 
 static inline void begin_six(const chains *c, rows_of_six *at, int chain)
