@@ -58,7 +58,8 @@ ACCELERATIONS = {
         ),
     ),
     "elimination along beams": Acceleration(
-        "The interior vertices of beams are eliminated first, in blocks of three unknowns. Dense "
+        "The interior vertices of beams are eliminated first, in blocks of three unknowns, in "
+        "space of six. Dense "
         "fronts factor the remaining matrix; KLU factors it if more than 24 unknowns remain and "
         "forces of connectors are among them. Without it, the same solver factors the whole "
         "tangent. On several processes, each process eliminates its own unknowns, or in scenes "
