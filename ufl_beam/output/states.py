@@ -513,7 +513,8 @@ class States:
         """Compute section forces of strains of a state, and of dead loads along cells."""
         t, cells = float(self._row("t", n)), self.cells_in_space(n)
         along: Array = np.zeros((len(cells.lengths), 2, 3))
-        for load, on_nodes in self.cells.loads_in_space:
+        # The undeformed scene has no section forces, as in the plane.
+        for load, on_nodes in self.cells.loads_in_space if self._row("q", n).any() else ():
             along += value_at(load.amplitude, t, load) * on_nodes
         resultants = self.forces_in_middle(n)
         return cells.section_forces(pieces, resultants, along, in_scene=in_scene)
