@@ -136,6 +136,13 @@ class InSpace:
         body = ub.Body(place.point, mass=mass.mass, inertia=mass.inertia, name="mass")
         self.more["bodies"].append(body)
         self.more["joints"].append(ub.Rigid(place, body.middle))
+        return body
+
+    def Velocity(self, velocity):
+        """Point masses at the beams move with them."""
+        masses = [x for x in self.plane.masses if getattr(x.place, "beam", None) in velocity.beams]
+        bodies = [self.at(x) for x in masses]
+        return self.same(velocity, beams=(*map(self.at, velocity.beams), *bodies))
 
     def Revolute(self, joint):
         return self.same(joint, axis=self.normal)
@@ -219,9 +226,9 @@ def differences(copy, plane, space, *, forces):
         for k, name in ((0, "Σ"), (1, "Γ"), (2, "K")):
             yield compare(f"{name} of {beam.name}", a[..., k], b[..., (0, 1, 5)[k]], small[k])
         yield compare(f"Γ3, T, K2 of {beam.name}", 0.0, b[..., 2:5], np.abs(a).max() + small.max())
-        if forces:  # at the beginning they are not in equilibrium
+        if forces:
             a, b = (
-                np.array([run.diagram(x, n, points=3)[1:] for n in times[1:]])
+                np.array([run.diagram(x, n, points=3)[1:] for n in times])
                 for run, x in ((plane, beam), (space, copy.at(beam)))
             )
             for k, name in enumerate("NVM"):
