@@ -511,7 +511,6 @@ def refused():
     return {
         "plot": lambda: ub.plot(run, "damage"),
         "response spectrum analysis": lambda: st.response_spectrum_analysis(scene, lambda T: 1.0),
-        "joint": lambda: run.joint(None),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.forms,
     }
 

@@ -474,6 +474,12 @@ def drifts():
     assert np.abs(across.shear[-1]).max() < 1e-6
     moved = blown().displacement(TOWER.end)[-1, :2]
     assert found.drift[-1].sum() == pytest.approx(moved @ (0.6, 0.8), rel=1e-12)
+    stays = [ub.Stretch(ub.ground(2, k, 0), TOWER.end, ub.Spring(1e5)) for k in (-1, 2)]
+    stayed = ub.Scene([TOWER], supports=[BASE], loads=[WIND], connectors=stays)
+    run = ub.simulate(stayed, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    found = st.storeys(run, [TOWER.start, TOWER.at(0.5), TOWER.end], direction=(3, 4))
+    assert np.abs(found.shear[-1] - [500.0 * 6, 500.0 * 3]).max() < 1e-5
+    assert max(abs(run.connector(x).force[-1]) for x in stays) > 1e3
     for words, more in (("in space give direction", {}), ("has no length", {"direction": (0, 0)})):
         with pytest.raises(ub.ArgumentError, match=words):
             st.storeys(blown(), [TOWER.start, TOWER.end], **more)
@@ -563,6 +569,99 @@ def test_the_table_has_all_analyses_of_scenes():
 @pytest.mark.parametrize("name", ANALYSES)
 def test_analyses_of_structures(name):
     ANALYSES[name]()
+
+
+# -- joints ----------------------------------------------------------------------------------------
+
+PIN, CENTER, AXIS = (0.3, -0.2, 0.5), (0.7, 0.1, 0.2), (1, 2, -1)
+SWINGING = ub.Body(
+    CENTER, mass=2.0, inertia=((0.05, 0.01, 0), (0.01, 0.08, 0.02), (0, 0.02, 0.06)), name="pan"
+)
+ROOT, HELD, APART = ub.ground(*PIN), SWINGING.at(*PIN), ub.ground(0, 0, 1.0)
+BEARINGS = {
+    "Rigid": ub.Rigid(ROOT, HELD, multipliers=True),
+    "Revolute": ub.Revolute(ROOT, HELD, axis=AXIS),
+    "Spherical": ub.Spherical(ROOT, HELD),
+    "reversed": ub.Revolute(HELD, ROOT, axis=AXIS),
+    "Universal": ub.Universal(ROOT, HELD, axes=(AXIS, (1, 0, 1))),
+    "Cylindrical": ub.Cylindrical(ROOT, HELD, axis=AXIS),
+    "Prismatic": ub.Prismatic(ROOT, HELD, axis=AXIS),
+    "Link": ub.Link(APART, HELD),
+    "RigidLink": ub.RigidLink(APART, HELD),
+}
+"""Joints of a body with the ground; those of the places of `Prismatic` and `RigidLink` turn alike,
+so that their moments are not known."""
+
+
+@pytest.mark.parametrize("kind", BEARINGS)
+def test_forces_of_joints_change_the_momenta(kind):
+    """Impulses of force, moment and weight are the changes of momentum and angular momentum."""
+    joint, weight = BEARINGS[kind], 2.0 * np.array([3.0, -9.0, -2.0])
+    scene = ub.Scene(bodies=[SWINGING], joints=[joint], loads=[ub.Gravity(tuple(weight / 2))])
+    arguments = {"t": (0, 0.48), "dt": 0.02, **RUN}
+    run = ub.simulate(scene, ub.EnergyMomentum(), **arguments)
+    found, sign = run.joint(joint), -1.0 if joint.places[1] is ROOT else 1.0
+    force, moment = sign * found.force[1:], sign * found.moment[1:]
+    rates = np.diff(run.momentum(), axis=0) / 0.02
+    held, center = ((x[1:] + x[:-1]) / 2 for x in map(run.position, (HELD, SWINGING.middle)))
+    size = np.abs(force).max()
+    assert np.abs(rates[:, :3] - force - weight).max() < 1e-9 * size
+    moments = rates[:, 3:] - np.cross(held, force) - np.cross(center, weight)
+    if kind in ("Prismatic", "RigidLink"):
+        assert np.isnan(moment).all()
+    else:
+        assert np.abs(moments - moment).max() < 1e-9 * size
+    # States of every third step have the same forces
+    some = ub.simulate(scene, ub.EnergyMomentum(), every=3, **arguments).joint(joint)
+    for every, third in zip(found, some, strict=True):
+        assert np.allclose(every[::3], third, rtol=0.0, atol=1e-10 * size, equal_nan=True)
+    for side, place in ((found.in_a, joint.places[0]), (found.in_b, joint.places[1])):
+        turns = Rotation.from_rotvec(run.displacement(place)[:, 3:])
+        middle = turns[:-1] * Rotation.from_rotvec((turns[:-1].inv() * turns[1:]).as_rotvec() / 2)
+        assert np.abs(middle.apply(side[1:]) - found.force[1:]).max() < 1e-12 * size
+
+
+def test_a_joint_bears_what_is_beyond_it():
+    """In statics force and moment of a corner are in equilibrium with the load, deformed."""
+    section = ub.Section(**STIFF, **OTHER)
+    one = ub.Beam((0, 0, 0), (1, 0.3, 0.2), section, name="one")
+    other = ub.Beam((1, 0.3, 0.2), (1.2, 1.1, 0), section, name="other")
+    corner, F = ub.Rigid(one.end, other.start, multipliers=True), np.array((3.0, -8.0, 5.0))
+    scene = ub.Scene(
+        [one, other], joints=[corner], supports=[ub.Clamped(one.start)],
+        loads=[ub.PointLoad(other.end, force=tuple(F))],
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, **RUN)
+    found, arm = run.joint(corner), run.position(other.end)[-1] - run.position(other.start)[-1]
+    assert np.abs(run.displacement(other.end)[-1, :3]).max() > 0.01
+    assert np.abs(found.force[-1] + F).max() < 1e-9
+    assert np.abs(found.moment[-1] + np.cross(arm, F)).max() < 1e-9
+    assert np.abs(found.motion).max() < 1e-12
+
+
+def test_forces_of_joints_are_those_of_the_plane():
+    def pendulum(turn):
+        d = 2 if turn is None else 3
+
+        def point(x, y):
+            return (x, y) if turn is None else tuple(turn.apply((x, y, 0)))
+
+        inertia = 0.1 if turn is None else 0.1 * np.eye(3)
+        body = ub.Body(point(0.5, 0.2), mass=2.0, inertia=inertia)
+        axis = {} if turn is None else {"axis": tuple(turn.apply((0, 0, 1)))}
+        joint = ub.Revolute(ub.ground(*(0.0,) * d), body.at(*(0.0,) * d), **axis)
+        weight = ub.Gravity(point(0, -9.81))
+        scene = ub.Scene(bodies=[body], joints=[joint], loads=[weight])
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, **RUN)
+        return run.joint(joint)
+
+    plane, space = pendulum(None), pendulum(SKEW)
+    for name in ("force", "in_a", "in_b"):
+        back = SKEW.inv().apply(getattr(space, name))
+        assert np.abs(back[:, :2] - getattr(plane, name)).max() < 1e-10
+        assert np.abs(back[:, 2]).max() < 1e-10
+    turned = SKEW.inv().apply(space.motion[:, 3:])
+    assert np.abs(turned - [[0, 0, x] for x in plane.motion[:, 2]]).max() < 1e-10
 
 
 # -- pictures --------------------------------------------------------------------------------------
