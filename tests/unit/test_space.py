@@ -506,10 +506,7 @@ def test_errors_before_a_run(case):
 def refused():
     """Functions that know planar scenes only, by name."""
     scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
-    dynamic = {"scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 0.05, "progress": False}
-    run = ub.simulate(scene, **dynamic)
     return {
-        "plot": lambda: ub.plot(run, "damage"),
         "response spectrum analysis": lambda: st.response_spectrum_analysis(scene, lambda T: 1.0),
         "dolfinx": lambda: ub.Simulation(scene, ub.EnergyMomentum()).dolfinx.forms,
     }

@@ -718,10 +718,63 @@ def test_other_pictures(tmp_path):
     assert ub.plot(scene, ax=figure.add_subplot(projection="3d")) is figure
     with pytest.raises(ub.ArgumentError, match="needs axes in space"):
         ub.plot(scene, ax=Figure().add_subplot())
-    with pytest.raises(ub.ModelError, match="'damage': only for scenes in the plane"):
-        ub.plot(run, "damage")
     with pytest.raises(ub.ArgumentError, match="component = 'psi' is not one of"):
         ub.plot(run, "history", scene.beams[0].end, component="psi")
+
+
+@pytest.mark.serial
+def test_pictures_of_damage():
+    """Yielded cells, hinges and their curves are those of the scene in the plane."""
+    law, hinge = ub.ElastoPlastic(30.0, isotropic=50.0), ub.LinearSoftening(20.0, 40.0)
+    runs = []
+    for make in (lambda *x: x, lambda *x: skew(*x, 0)):
+        turned = len(make(1, 0)) == 3
+        more = {"up": skew(0, 1, 0)} if turned else {}
+        axes = {"along": skew(1, 0, 0), "up": skew(0, 0, 1)} if turned else {}
+        section = ub.Section(**STIFF, **OTHER, bending=law)
+        post = ub.Beam(
+            make(0, 0), make(1, 0), section, cells=4, hinges={0.5: hinge}, name="post", **more
+        )
+        pull = ub.PrescribedDisplacement(post.end, v=lambda t: 0.3 * math.sin(3 * t), **axes)
+        scene = ub.Scene([post], supports=[ub.Clamped(post.start), pull])
+        runs.append(ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, **RUN))
+    marks = []
+    for run in runs:
+        (post,) = run.scene.beams
+        axes, bar = ub.plot(run, "damage", limits={"IO": 0.01}).axes
+        (zones,) = (x for x in axes.collections if x.get_gid() == "yielded")
+        marks.append((zones.get_array(), len(zones.get_edgecolor()), bar.get_ylim()))
+        for quantity, place in (("hinge", post.at(0.5)), ("moment-curvature", post.at(0.1))):
+            axes = ub.plot(run, quantity, place).axes[0]
+            curve = np.array(axes.collections[-1].get_segments())
+            marks[-1] += (curve, axes.get_title("left").partition(":")[2])
+    for a, b in zip(*marks, strict=True):
+        if isinstance(a, np.ndarray | tuple):
+            assert np.allclose(a, b, rtol=1e-6, atol=1e-9)
+        else:
+            assert a == b
+
+
+@pytest.mark.serial
+def test_pictures_of_modes(tmp_path):
+    """Modes side by side, drawn to one scale in a view with z up; also of buckling."""
+    shapes = ub.modes(FREE, 3)
+    figure = ub.plot(shapes, numbers=[0, 2])
+    figure.savefig(tmp_path / "modes.png")
+    assert [x.get_title("left") for x in figure.axes] == [
+        f"{k}: {shapes.titles[k]}" for k in (0, 2)
+    ]
+    assert len({(*x.get_xlim(), *x.get_ylim(), *x.get_zlim()) for x in figure.axes}) == 1
+    for axes in figure.axes:  # inside of the panel, and not small
+        lines = np.hstack([x.get_data_3d() for x in axes.lines])
+        at = np.array(proj_transform(*lines, axes.get_proj())[:2]).T
+        at = axes.transAxes.inverted().transform(axes.transData.transform(at))
+        assert np.nanmin(at) > 0.0
+        assert np.nanmax(at) < 1.0
+        assert np.ptp(at[~np.isnan(at).any(axis=1)], axis=0).max() > 0.7
+    push = ub.PointLoad(TOWER.end, force=(0, 0, -1.0))
+    column = ub.Scene([TOWER], supports=[BASE], loads=[push])
+    assert "<img" in ub.buckling(column, 1)._repr_html_()
 
 
 @pytest.mark.serial
