@@ -333,6 +333,7 @@ def _of_forces(draw: Any, names: Sequence[str] = ("M", "N", "V")) -> dict[str, A
 
 
 IN_SPACE[LoadCombinations] = _of_forces(draw_combinations, style.COMPONENTS)
+IN_SPACE[SpectralResponse] = _of_forces(draw_response, style.COMPONENTS)
 PICTURES.update({
     Calibration: {"fit": draw_calibration},
     Storeys: _of_forces(draw_storeys, ("drift", "shear")),
