@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.simulation import initial_state
 
 TUBE = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
 LIGHT = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3)
@@ -171,6 +172,18 @@ def test_redundant_joints_are_refused_by_name():
         with pytest.raises(ub.ModelError, match="contradict"):
             ub.plot(four_bars(kinds))
     assert run(four_bars("RRSC")).energy.worst < 1e-12
+
+
+def test_constraints_that_repeat_during_a_run_are_named(monkeypatch):
+    """As in a dead centre, which no check of the undeformed scene finds."""
+    monkeypatch.setattr(initial_state, "require_independent", lambda scene: None)
+    with pytest.raises(ub.ConvergenceError, match="singular: the constraints of ") as failed:
+        run(four_bars("RRRR"))
+    words = str(failed.value).partition("constraints of ")[2].partition(" are not independent")
+    assert words[1]
+    assert words[0].count("Revolute") == 3
+    assert "and 1 more" in words[0]
+    assert "idle" not in words[0]
 
 
 def test_redundant_supports_and_drives_are_refused_by_name():
