@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.simulation import initial_state
 
 TUBE = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
 LIGHT = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3)
@@ -128,3 +129,93 @@ def test_symbols_lie_in_the_picture():
     seen, turned = vectors @ PICTURE[3].T, left @ PICTURE[3].T
     assert np.allclose(turned, seen[:, ::-1] * (-1.0, 1.0), atol=1e-14)
     assert math.isclose(PICTURE[3][1, 2], np.abs(PICTURE[3][:, 2]).max())  # z is upwards
+
+
+# -- constraints that repeat -----------------------------------------------------------------------
+
+CORNERS = (0, 0, 0), (0.2, 1, 0), (1.5, 1.4, 0), (1.4, 0, 0)
+KINDS = {
+    "R": lambda *at: ub.Revolute(*at, axis=(0, 0, 1)),
+    "C": lambda *at: ub.Cylindrical(*at, axis=(0, 0, 1)),
+    "U": lambda *at: ub.Universal(*at, axes=((0, 0, 1), (1, 0, 0))),
+    "S": ub.Spherical,
+}
+
+
+def rod(start, end, name):
+    middle = tuple((a + b) / 2 for a, b in zip(start, end, strict=True))
+    return ub.Body(middle, mass=1.0, inertia=(0.1, 0.1, 0.1), name=name)
+
+
+def four_bars(kinds):
+    """A planar linkage of three bodies and the ground in space, with joints of these kinds."""
+    rods = [rod(*CORNERS[k : k + 2], f"rod {k}") for k in range(3)]
+    idle = rod((9, 9, 9), (9, 9, 10), "idle")
+    ground = [ub.ground(*x) for x in CORNERS]
+    before = [ground[0], *(b.at(*x) for b, x in zip(rods, CORNERS[1:], strict=True))]
+    after = [*(b.at(*x) for b, x in zip(rods, CORNERS[:3], strict=True)), ground[3]]
+    joints = [KINDS[x](a, b) for x, a, b in zip(kinds, before, after, strict=True)]
+    joints.append(ub.Revolute(ub.ground(9, 9, 9), idle.at(9, 9, 9), axis=(1, 2, 3)))
+    return ub.Scene(bodies=[*rods, idle], joints=joints, loads=[ub.Gravity((0, -9.81, 0))])
+
+
+def test_redundant_joints_are_refused_by_name():
+    """A loop moves in one way, so of its constraints 18 - 1 = 17 are independent."""
+    for kinds, repeated in (("RRRR", 3), ("RRUR", 2), ("RRSR", 1), ("RRCR", 2), ("RRCU", 1)):
+        with pytest.raises(ub.ModelError) as refused:
+            run(four_bars(kinds))
+        words = str(refused.value)
+        assert f"contradict each other: {repeated} of the constraints of Revolute(ground" in words
+        assert "rod 1 (1.5, 1.4, 0), rod 2 (1.5, 1.4, 0)" in words
+        assert "Spherical, Cylindrical or Universal in place of Revolute" in words
+        assert "idle" not in words
+        with pytest.raises(ub.ModelError, match="contradict"):
+            ub.plot(four_bars(kinds))
+    assert run(four_bars("RRSC")).energy.worst < 1e-12
+
+
+def test_constraints_that_repeat_during_a_run_are_named(monkeypatch):
+    """As in a dead centre, which no check of the undeformed scene finds."""
+    monkeypatch.setattr(initial_state, "require_independent", lambda scene: None)
+    with pytest.raises(ub.ConvergenceError, match="singular: the constraints of ") as failed:
+        run(four_bars("RRRR"))
+    words = str(failed.value).partition("constraints of ")[2].partition(" are not independent")
+    assert words[1]
+    assert words[0].count("Revolute") == 3
+    assert "and 1 more" in words[0]
+    assert "idle" not in words[0]
+
+
+def test_redundant_supports_and_drives_are_refused_by_name():
+    slope = ub.PrescribedDisplacement(ARM.end, u=0.0, along=(1, 2, 2))
+    rail = ub.Prismatic(ub.ground(1, 1, 1), ARM.end, axis=(0, 1, -1), turning=True)
+    drive = ub.Turn(ub.ground(0, 0, 0), ARM.start, ub.PrescribedMotion(math.sin), axis=(1, 1, 0))
+    for joints, supports, drives, names in (
+        # the rail holds the displacement across (0, 1, -1), of which (1, 2, 2) is a direction
+        ([rail], [slope], [], r"Prismatic.*; PrescribedDisplacement at arm.end \(1, 0, 0\) can"),
+        ([], [FOOT], [drive], r"1 of .* Turn.* with PrescribedMotion; Clamped at arm.start"),
+    ):
+        with pytest.raises(ub.ModelError, match=names):
+            run(ub.Scene([ARM], joints=joints, supports=supports, connectors=drives))
+
+
+def test_redundant_loops_of_flexible_beams_run():
+    """The same linkage with beams has no constraint that follows from the others."""
+    rods = [beam(*CORNERS[k : k + 2], name=f"rod {k}") for k in range(3)]
+    places = ub.ground(*CORNERS[0]), *(x for b in rods for x in (b.start, b.end))
+    places = *places, ub.ground(*CORNERS[3])
+    pairs, weight = zip(places[::2], places[1::2], strict=True), ub.Gravity((0, -9.81, 0))
+    joints = [ub.Revolute(a, b, axis=(0, 0, 1)) for a, b in pairs]
+    assert run(ub.Scene(rods, joints=joints, loads=[weight])).energy.worst < 1e-9  # rtol
+
+
+def test_connectors_whose_motions_are_held():
+    post = beam((1, 0, 0), (1, 1, 0), name="post")
+    hinge = ub.Revolute(ARM.end, post.start, axis=(0, 1, 0))
+    still, free = (
+        ub.Turn(ARM.end, post.start, ub.Spring(1e3), axis=axis, name=name)
+        for name, axis in (("still", (1, 0, 0)), ("free", (0, 1, 0)))
+    )
+    with pytest.warns(ub.ModelWarning, match="is held at zero by Revolute") as warned:
+        run(ub.Scene([ARM, post], joints=[hinge], supports=[FOOT], connectors=[still, free]))
+    assert [str(x.message).partition(":")[0] for x in warned] == [str(still)]

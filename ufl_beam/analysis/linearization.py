@@ -21,7 +21,16 @@ from ufl_beam.blocks.beams import section_law
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.cell_functions import mass_forces, stress_forces
-from ufl_beam.discretization.cells_in_space import TURNS, rotation_vectors, rotations_between
+from ufl_beam.discretization.cells_in_space import (
+    STIFFNESS_IN_SPACE,
+    TURNS,
+    CellsOfState,
+    cell_axes,
+    rotation_vectors,
+    rotations_between,
+    turned_further,
+    turns_at,
+)
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_touching, warn_of_warping
@@ -255,15 +264,22 @@ class Linearization:
         return toward, float(along @ y[: len(along)])
 
     def support_forces(self, shapes: Array, omega: Array) -> Array:
-        """Return the forces that supports exert in modes of given frequencies (rad/s); (size, n).
+        """Return forces and moments of supports in modes of given frequencies (rad/s).
 
-        They are T x - ω² M x; at degrees of freedom without support they vanish.
+        They are T x - ω² M x, along the axes of the scene; (num_supports, 3 or 6, n).
         """
         x, laws = shapes.copy(), self._laws
         x[laws] = 0.0
         if len(laws):
             x[laws] = -(self.tangent[laws] @ x) / self.tangent.diagonal()[laws][:, None]
-        return np.asarray(self.tangent @ x - self.masses @ x * omega**2)
+        forces = self.tangent @ x - self.masses @ x * omega**2
+        places = [support.place for support in self.scene.supports]
+        nodes = np.reshape([self.numbering.node(x) for x in places], (-1, self.numbering.width))
+        found = np.asarray(forces[nodes])
+        for k, place in enumerate(places if self.scene.in_space else ()):
+            turn = turns_at(self.numbering, place, self.turns[None]).as_matrix()[0]
+            found[k, 3:] = turn @ found[k, 3:]  # moments are about axes of the node
+        return found
 
     # -- forces of the state -------------------------------------------------------------------
 
@@ -470,5 +486,39 @@ def linear_forces_of_cells(
         inertia.add(acceleration, space)
         cells.accept()
         return cells(x, x)
+
+    return forces
+
+
+def linear_forces_in_space(
+    numbering: DofNumbering, q: Array, turns: Array, given: Array | None
+) -> Callable[[Array, Array], Array]:
+    """Return a function of a small motion, and of its acceleration; (size,) each.
+
+    The state has the rotations ``turns``, and the section forces ``given`` in the middle of cells
+    (num_cells, 6), by default those of the strains.  The function computes changes of the section
+    forces at the start, in the middle and at the end of cells, with inertial forces on their nodes,
+    in axes of the sections of the state; (num_cells, 3, 6).
+    """
+    fields, fractions = Fields(Subdomain(numbering, MPI.COMM_SELF)), np.array([0.0, 0.5, 1.0])
+    axes, stiffness = cell_axes(fields), fields.section_values(*STIFFNESS_IN_SPACE)
+    state = CellsOfState.of(numbering, axes, q, turns)
+    strains = state.strains()
+    resultants = stiffness * strains if given is None else given
+    shares = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6
+    masses = fields.section_values("rhoA")[:, :, None] * state.lengths[:, None, None] * shares
+    dofs = numbering.dofs[numbering.cells][:, :, :3]
+
+    def forces(x: Array, acceleration: Array) -> Array:
+        ε, ends = 10 * CHANGE / (np.abs(x * numbering.scales).max() or 1.0), []
+        for part in (ε, -ε):
+            further = turned_further(numbering, turns, part * x)
+            cells = CellsOfState.of(numbering, axes, q + part * x, further)
+            changed = resultants + stiffness * (cells.strains() - strains)
+            along = -part * masses @ acceleration[dofs]
+            ends.append(cells.section_forces(fractions, changed, along, in_scene=True))
+        change = (ends[0] - ends[1]) / (2 * ε)
+        found = [state.in_section(s, *np.hsplit(change[:, k], 2)) for k, s in enumerate(fractions)]
+        return np.stack(found, axis=1)
 
     return forces

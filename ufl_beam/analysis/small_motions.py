@@ -5,13 +5,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import null_space
-from scipy.sparse import block_array, csr_array, diags_array, eye_array
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linearization import Linearization
@@ -72,20 +71,32 @@ class SmallMotions(Linearization):
         Returns squared frequencies (rad²/s²), motions x in columns, their works xᵀ K x (J), whether
         each work may be round-off, and the least squared frequency of the other motions.
         """
-        solve = partial(eigensolvers.linear, matrix, self.M, n, most=self.most, definite=definite)
+        least = -SHIFT * self.squares.min()
+
+        def solve(shift: float) -> tuple[Array, Array, Array, npt.NDArray[np.bool_]]:
+            values, x = eigensolvers.linear(
+                matrix, self.M, n, most=self.most, definite=definite, shift=shift
+            )
+            motions = np.where(values.imag < 0.0, x.imag, x.real)  # both of a conjugate pair
+            zero = np.abs(values) <= ROUND_OFF * self.squares.max()
+            if zero.any() and not definite:
+                # Eigenvectors have errors above round-off; an inverse iteration reduces them.
+                inverse = splu(csc_array(matrix - least * self.M))
+                motions[:, zero] = inverse.solve(self.M @ motions[:, zero])
+                motions[:, zero] /= np.linalg.norm(motions[:, zero], axis=0)
+            return values.real, motions, *self._works(motions)
+
         try:
-            values, x = solve(shift=-SHIFT * self.squares.min())
+            values, x, works, zero = solve(least)
         except np.linalg.LinAlgError:
             raise ArgumentError(
                 "neither mass nor stiffness determines some motion in this state; give it mass"
             ) from None
-        works, zero = self._works(x.real)
-        first = np.abs(values[~zero].real).min(initial=self.squares.max())
+        first = np.abs(values[~zero]).min(initial=self.squares.max())
         if zero.any():
             # A second shift is far from zero eigenvalues, whose huge inverses cost digits.
-            values, x = solve(shift=-first / 2)
-            works, zero = self._works(x.real)
-        return values.real, x.real, works, zero, first
+            values, x, works, zero = solve(-first / 2)
+        return values, x, works, zero, first
 
     def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""

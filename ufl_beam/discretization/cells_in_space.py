@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors, values_at
+from ufl_beam.discretization.dof_numbering import DofNumbering, Vectors, turned, values_at
 from ufl_beam.discretization.function_spaces import STIFFNESS, Fields
 from ufl_beam.mechanics.spatial_kinematics import FLIPPED
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, arm
@@ -220,6 +220,21 @@ def by_rotation(numbering: DofNumbering, turns: Array) -> Array:
 def rotation_vectors(turns: Array) -> Array:
     """Return rotation vectors, of angles up to π; (n, 3); rad."""
     return np.asarray(_rotations(turns).as_rotvec())
+
+
+def rotated(vectors: Any, rotations: Array) -> Array:
+    """Rotate vectors by angles (n, 1), or in space by rotation vectors (n, 3); rad."""
+    if rotations.shape[1] == 1:
+        return turned(vectors, rotations[:, 0])
+    return np.asarray(Rotation.from_rotvec(rotations).apply(vectors))
+
+
+def rotation_from(a: Array, b: Array) -> Array:
+    """Return rotations ``b`` relative to ``a``, as in :func:`rotated`; in axes that turn with a."""
+    if a.shape[1] == 1:
+        return np.asarray(b - a)
+    back, now = (Rotation.from_rotvec(x) for x in (-a, b))
+    return np.asarray((back * now).as_rotvec())
 
 
 def _rotations(turns: Array) -> Rotation:

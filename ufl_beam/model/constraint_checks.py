@@ -18,7 +18,6 @@ from ufl_beam.model.bodies import (
     Body,
     Member,
     Node,
-    NodeDof,
     base_of,
     node,
 )
@@ -40,7 +39,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Point
 from ufl_beam.model.loads import MovingLoad
 from ufl_beam.model.material_law import initial_state
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, Unknown
 from ufl_beam.model.supports import Support
 from ufl_beam.model.works import Effect, VirtualWork
 
@@ -100,15 +99,17 @@ def require_inertia(scene: Scene) -> None:
     )
 
 
-def _supports(scene: Scene) -> dict[NodeDof, Support]:
-    """Return the supports with unrotated axes by the degrees of freedom that they hold."""
-    same = scene.representatives
-    return {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
+def _supports(scene: Scene) -> dict[Unknown, Support]:
+    """Return the supports with unrotated axes by the unknowns that they hold."""
+    return {
+        scene.unknown(node(s.place), c): s for s in scene.supports if not s.turns for c in s.held
+    }
 
 
-def _fixed(scene: Scene) -> set[NodeDof]:
-    """Return the degrees of freedom of the ground and of supports with unrotated axes."""
-    return {scene.representatives[GROUND, c] for c in range(3)} | _supports(scene).keys()
+def _fixed(scene: Scene) -> set[Unknown]:
+    """Return the unknowns of the ground and of supports with unrotated axes."""
+    components = range(6 if scene.in_space else 3)
+    return {scene.unknown(GROUND, c) for c in components} | _supports(scene).keys()
 
 
 Row = list[tuple[Node, Sequence[float]]]
@@ -140,7 +141,10 @@ def require_independent(scene: Scene) -> None:
     raise ModelError(
         "constraints repeat or contradict each other: "
         f"{_number(combinations)} of the constraints of {'; '.join(names)} can be left out. "
-        "Remove one, or make it elastic: "
+        "Remove one, "
+        + "let a joint hold less, as Spherical, Cylindrical or Universal in place of Revolute, "
+        * scene.in_space
+        + "or make it elastic: "
         + (
             "a RigidPlastic connector holds its motion until it yields, and a "
             "Spring(stiffness, law=...) yields, too; replace two in parallel by one with the "
@@ -154,22 +158,26 @@ def require_independent(scene: Scene) -> None:
 
 def _supports_and_joints_at(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
     """Iterate over supports and joints that act on degrees of freedom of constraints ``rows``."""
-    same, supports = scene.representatives, _supports(scene)
+    supports = _supports(scene)
     for row in rows:
-        ends = [same[moved, c] for moved, factors in row for c in range(3) if factors[c]]
+        ends = [scene.unknown(moved, c) for moved, x in row for c, y in enumerate(x) if y]
         yield from (supports[dof] for dof in ends if dof in supports)
         twice = {dof for dof in ends if ends.count(dof) > 1}
-        for joint in scene.joints:
-            if any(same[dof] in twice for c in joint.shared for dof in joint.equal(c)):
+        for joint in scene.joints if twice else ():
+            shared = (
+                scene.unknown(moved, k)
+                for c in joint.shared
+                for moved, _ in joint.equal(c)
+                for k in scene.components(c)
+            )
+            if not twice.isdisjoint(shared):
                 yield joint
 
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether sticking friction makes constraints linearly dependent."""
-    friction = sum(has_friction(connector.law) for connector in scene.all_connectors)
-    if scene.in_space:  # constraints are not compared there
-        return friction > 1
-    return friction > 0 and _dependences(scene, friction=True)[1].shape[1] > 0
+    friction = any(has_friction(connector.law) for connector in scene.all_connectors)
+    return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
 
 def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:
@@ -188,10 +196,10 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
 
     if not any(map(holds, scene.all_connectors)):
         return [], np.zeros((0, 0))
-    turned = (support for support in scene.supports if support.angle)
+    turned = (support for support in scene.supports if support.turns)
     rows, fixed = [*_rows(scene, holds, turned)], _fixed(scene)
     combined = [_gradient(scene, row, fixed) for _, row in rows]
-    rows_at: dict[NodeDof, set[int]] = defaultdict(set)
+    rows_at: dict[Unknown, set[int]] = defaultdict(set)
     for number, gradient in enumerate(combined):
         for dof in gradient:
             rows_at[dof].add(number)
@@ -207,19 +215,20 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     if not left:
         return [], np.zeros((0, 0))
     indices = sorted(left)
-    columns: dict[NodeDof, Entries] = defaultdict(list)  # of the gradients that are left
+    columns: dict[Unknown, Entries] = defaultdict(list)  # of the gradients that are left
     for i, number in enumerate(indices):
         for dof, factor in combined[number].items():
             columns[dof].append((i, factor))
     return [rows[number] for number in indices], _null_space([*columns.values()], len(indices))
 
 
-def _gradient(scene: Scene, row: Row, fixed: set[NodeDof]) -> dict[NodeDof, float]:
-    """Return the factors of a constraint at the degrees of freedom that are not ``fixed``."""
-    sums: dict[NodeDof, float] = defaultdict(float)
+def _gradient(scene: Scene, row: Row, fixed: set[Unknown]) -> dict[Unknown, float]:
+    """Return the factors of a constraint at the unknowns that are not ``fixed``."""
+    sums: dict[Unknown, float] = defaultdict(float)
     for carrier, factors in row:
         for component, factor in enumerate(factors):
-            sums[scene.representatives[carrier, component]] += factor
+            if factor:
+                sums[scene.unknown(carrier, component)] += factor
     # Factors at both ends that act on the same degree of freedom cancel to round-off.
     return {dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed}
 
@@ -420,10 +429,11 @@ def warn_of_held_motions(scene: Scene) -> None:
     The gradient of such a motion is a combination of constraints of joints between the same places,
     or vanishes at all free degrees of freedom.
     """
-    if not scene.connectors or scene.in_space:
+    if not scene.connectors:
         return
-    moving = [(node(s.place), c) for s in scene.supports for c in s.moving]
-    fixed = _fixed(scene) - {scene.representatives[dof] for dof in moving}
+    fixed = _fixed(scene) - {
+        scene.unknown(node(s.place), c) for s in scene.supports for c in s.moving
+    }
     rows, between = dict[object, Row](_rows(scene, lambda _: True, ())), defaultdict(list)
     for joint in scene.joints:
         for holder in joint.holders:

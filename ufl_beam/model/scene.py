@@ -21,6 +21,7 @@ from ufl_beam.model.bodies import (
     Body,
     BodyPoint,
     Member,
+    Node,
     NodeDof,
     Place,
     PointMass,
@@ -71,6 +72,9 @@ from ufl_beam.model.loads import (
 from ufl_beam.model.records import Record
 from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
 from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
+
+Unknown = tuple[NodeDof, int]
+"""Degrees of freedom that are equal, by one of them, with the component of its node."""
 
 
 def _all(*kinds: type) -> Callable[..., tuple[Any, ...]]:
@@ -186,7 +190,7 @@ class Scene(Record, Rich):
     def __repr__(self) -> str:
         return f"<Scene: {self}>"
 
-    @property
+    @cached_property
     def in_space(self) -> bool:
         """True if points of the scene have three coordinates."""
         points = (*(b.ends[0] for b in self.beams), *(b.center for b in self.bodies))
@@ -220,6 +224,11 @@ class Scene(Record, Rich):
         In space the first component stands for all displacements, and the last for all rotations.
         """
         return {0: (0, 1, 2), 1: (), 2: (3, 4, 5)}[component] if self.in_space else (component,)
+
+    def unknown(self, moved: Node, component: int) -> Unknown:
+        """Return a representative of equal unknowns of nodes; components as in supports."""
+        group = 2 * (component // 3) if self.in_space else component
+        return self.representatives[moved, group], component
 
     def require_plane(self, what: str) -> None:
         """Raise :class:`ModelError` if points of the scene have three coordinates."""
@@ -396,16 +405,12 @@ class Scene(Record, Rich):
         return merged([*self.shared_by_joints, *hinges])
 
     def _require_single_supports(self) -> None:
-        def dof(member: Any, component: int) -> tuple[NodeDof, int]:
-            group = (0, 0, 0, 2, 2, 2)[component] if self.in_space else component
-            return self.representatives[member, group], component
-
-        holders = {dof(GROUND, c): "the ground" for c in range(6 if self.in_space else 3)}
+        holders = {self.unknown(GROUND, c): "the ground" for c in range(6 if self.in_space else 3)}
         for support in self.supports:
             # A support with rotated axes involves all components that it rotates.
             components = {*support.held, *(c for *pair, _ in support.turns for c in pair)}
             for component in sorted(components):
-                held = dof(node(support.place), component)
+                held = self.unknown(node(support.place), component)
                 if held in holders:
                     raise ModelError(
                         f"supports in conflict: {holders[held]} and {support} both hold "

@@ -323,12 +323,14 @@ class JointHistory(NamedTuple):
 
     Attributes:
         motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
-            relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
-        force: Force of the joint on b, in the plane; (n+1, 2); N.
-        in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
-        moment: Moment of the joint on b, about the place b; (n+1,); N m.  If the places share
-            their rotation, the moment is unknown: NaN.  In energy-momentum schemes it does the
-            work of the step on the change of the rotation, and has an error of second order.
+            relative to a, in space a rotation vector in these axes; zero in the undeformed scene;
+            (n+1, 3), in space (n+1, 6); m, rad.
+        force: Force of the joint on b, along x and y, in space z; (n+1, 2 or 3); N.
+        in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2 or 3); N.
+        moment: Moment of the joint on b, about the place b; (n+1,), in space along x, y, z,
+            (n+1, 3); N m.  If the places share their rotation, the moment is unknown: NaN.  In
+            energy-momentum schemes it is a mean of the step: in the plane it does the work of the
+            step on the change of the rotation, in space it is that of its vectors.
     """
 
     motion: Array

@@ -21,7 +21,10 @@ from ufl_beam.discretization.cells_in_space import (
     CellsOfState,
     cell_axes,
     momentum_in_space,
+    rotated,
+    rotation_from,
     rotation_vectors,
+    turned_further,
     turns_at,
     velocity_in_space,
 )
@@ -396,31 +399,27 @@ class States:
             ArgumentError: The joint is not in the scene, or the second place shares unknowns with
                 another one.
         """
-        self.scene.require_plane("joint")
         resultants, (a, b, *_) = connector_indices(self.scene, joint), joint.places
-        signs = signs_on_second_place(joint)
-        rotations = [self.displacement(place)[:, 2] for place in (a, b)]
-        ends = self._ends()
-        angles = [np.sum([w * x.displacement(p)[:, 2] for w, x in ends], 0) for p in (a, b)]
+        signs, d = signs_on_second_place(joint), self.numbering.displacements
+        rotations = [self.displacement(place)[:, d:] for place in (a, b)]
         between = self.position(b) - self.position(a)
-        apart = turned(between, -rotations[0]) - np.subtract(b.point, a.point)
-        motion = np.column_stack([apart, rotations[1] - rotations[0]])
-        force, moment = np.zeros((len(self), 2)), np.zeros(len(self))
+        apart = rotated(between, -rotations[0]) - np.subtract(b.point, a.point)
+        motion = np.column_stack([apart, rotation_from(*rotations)])
+        force, moment = np.zeros((len(self), d)), np.zeros((len(self), 2 * d - 3))
         if 2 in joint.shared:
             moment[:] = np.nan
         forces = self.column("connectors")[:, resultants, FORCE].T
         for k, sign in signs.items():
-            holder, λ = joint.holders[k], sign * forces[k]
-            if holder.is_rotation:
-                moment -= λ
-            else:
-                force -= λ[:, None] * self.directions(holder)
-        in_a, in_b = (turned(force, -angle) for angle in angles)
-        return JointHistory(motion, force, in_a, in_b, moment)
+            holder = joint.holders[k]
+            resultant = moment if holder.is_rotation else force
+            resultant -= (sign * forces[k])[:, None] * self.directions(holder)
+        in_a, in_b = (rotated(force, -self._rotation_in_step(place)) for place in (a, b))
+        return JointHistory(motion, force, in_a, in_b, moment if d == 3 else moment[:, 0])
 
     def directions(self, connector: Connector) -> Array:
-        """Return directions in which b moves if the motion of a connector grows; (n+1, 2).
+        """Return directions in which b moves if the motion of a connector grows; (n+1, 2 or 3).
 
+        Of rotations that joints hold they are axes, in the plane 1; (n+1, 1 or 3).
         They belong to the step that ends at each time, as the forces do: with
         :attr:`equilibrium_fraction` < 1 they are means of the directions at both ends of it.
         """
@@ -436,27 +435,47 @@ class States:
                     x, y = chord * np.sign(chord @ (x, y))
                 normals.append((-y, x))
             return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-        found, length = np.zeros((len(self), 2)), np.ones(len(self))
+        if connector.is_rotation and not self.scene.in_space:
+            return np.ones((len(self), 1))
         if connector.stretches:
-            length[:] = 0.0
-            for weight, some in ends:
-                between = some.position(b) - some.position(a)
-                found += weight * between
-                length += weight * np.linalg.norm(between, axis=1)
-        else:
-            for weight, some in ends:
-                angle = some.displacement(a)[:, 2] if connector.follows_a else np.zeros(len(self))
-                found += weight * turned(connector.axis, angle)
-        return found / length[:, None]
+            apart = [(weight, some.position(b) - some.position(a)) for weight, some in ends]
+            length = sum(weight * np.linalg.norm(x, axis=1) for weight, x in apart)
+            return np.asarray(sum(weight * x for weight, x in apart) / length[:, None])
+
+        def mean(axis: Sequence[float], place: AttachmentPoint, follows: bool) -> Array:
+            d = self.numbering.displacements
+            turns = [(w, follows * some.displacement(place)[:, d:]) for w, some in ends]
+            return np.asarray(sum(weight * rotated(axis, x) for weight, x in turns))
+
+        if connector.is_rotation:
+            other, axis = mean(connector.other, b, True), mean(connector.axis, a, True)
+            return np.asarray(np.cross(other, axis))
+        return mean(connector.axis, a, connector.follows_a)
+
+    def _rotation_in_step(self, place: AttachmentPoint) -> Array:
+        """Return the rotation of a place to which forces of steps belong; (n+1, 1 or 3); rad."""
+        ends, d = self._ends(), self.numbering.displacements
+        weights, rotations = zip(*((w, x.displacement(place)[:, d:]) for w, x in ends), strict=True)
+        if not self.scene.in_space or len(ends) == 1:
+            return np.asarray(sum(w * x for w, x in zip(weights, rotations, strict=True)))
+        now, begun = rotations
+        return rotation_from(-now, weights[1] * rotation_from(now, begun))
 
     def _ends(self) -> list[tuple[float, States]]:
         """Return the states, and configurations at the beginnings of their steps, with weights."""
         e = self.equilibrium_fraction
         if e == 1.0:
             return [(e, self)]
-        begun, columns = States(self.numbering), Columns({"t": (), "q": (self.numbering.size,)})
+        names: dict[str, tuple[int, ...]] = {"t": (), "q": (self.numbering.size,)}
+        if self.scene.in_space:
+            names[TURNS] = self.turns(0).shape
+        begun, columns = States(self.numbering), Columns(names)
         for n in range(len(self)):
-            begun.append(columns, np.zeros(1), self.before(n))
+            state = [np.zeros(1), q := self.before(n)]
+            if self.scene.in_space:
+                change = q - self._row("q", n)
+                state.append(turned_further(self.numbering, self.turns(n), change).ravel())
+            begun.append(columns, *state)
         return [(e, self), (1.0 - e, begun)]
 
     def reaction(self, support: Support) -> Array:

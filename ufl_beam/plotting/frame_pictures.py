@@ -326,8 +326,9 @@ def draw_damage_state(
     ``limits``, see ``structures.hinge_table``, all hinges are coloured by the limit that they meet.
     """
     from matplotlib.collections import LineCollection
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
-    numbering = solution.numbering
+    numbering, in_space = solution.numbering, solution.scene.in_space
     if not any(map(can_yield, solution.scene.connectors)):
         for beam in solution.scene.beams[:1]:
             solution.material(beam)  # raises if the scene is elastic
@@ -342,7 +343,8 @@ def draw_damage_state(
         if yielded.any():
             unit, prefix = style.decimal_prefix(float(density.max()))
             colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
-            zones = LineCollection(
+            kind: Any = Line3DCollection if in_space else LineCollection
+            zones = kind(
                 list(shape.nodes[numbering.nodes_along_cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
                 linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
@@ -351,7 +353,7 @@ def draw_damage_state(
             placed = [beam.section.fibres for beam in solution.scene.beams]
             cracks = any(f.softening is not None for p in placed if p is not None for f in p.fibres)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
-            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
+            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)", 0.1 if in_space else 0.02)
         if hinges := open_hinges(solution, n, shape.at, limits):
             _draw_hinges(axes, ax, solution, shape, hinges, limits)
         arrange(axes, ax)

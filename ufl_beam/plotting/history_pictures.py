@@ -23,8 +23,14 @@ from ufl_beam.plotting.frame_pictures import (
     draw_outlines,
     draw_undeformed,
 )
-from ufl_beam.plotting.labels import arrange, fitted_canvas, scene_axes
-from ufl_beam.plotting.positions import evenly
+from ufl_beam.plotting.labels import (
+    arrange,
+    fit_in_space,
+    fitted_canvas,
+    scene_axes,
+    set_up_in_space,
+)
+from ufl_beam.plotting.positions import PICTURE, evenly
 from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
@@ -198,16 +204,20 @@ def draw_modes(
     if not chosen:
         raise ArgumentError(f"plot: {'numbers is empty' if len(shapes) else 'there is no shape'}")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
-    stages = [fitted_canvas(swing, [0, 1], size=(4.0, np.inf)) for swing in swings]
-    box = np.concatenate([canvas.points() for canvas in stages])
+    in_space = shapes.scene.in_space
+    size = 4.0, 4.0 if in_space else np.inf
+    stages = [fitted_canvas(swing, [0, 1], size=size) for swing in swings]
+    points = np.concatenate([canvas.points() for canvas in stages])
+    box = points @ PICTURE[points.shape[1]].T
     # space for the symbols of supports
     margin = 0.08 * np.hypot(*np.ptp(box, axis=0))
     corners = np.array([box.min(axis=0) - margin, box.max(axis=0) + margin])
-    width, height = np.ptp(corners, axis=0)
+    width, height = (1.0, 1.0) if in_space else np.ptp(corners, axis=0)
     columns = min(len(chosen), 3 if height < 0.8 * width else 4)
     rows = -(-len(chosen) // columns)
     with picture((4.0 * columns, rows * (4.0 * height / width + 0.5))) as figure:
-        panels = np.ravel(figure.subplots(rows, columns, squeeze=False))
+        projection = {"projection": "3d" if in_space else None}
+        panels = figure.subplots(rows, columns, squeeze=False, subplot_kw=projection).ravel()
         for axes in panels:
             axes.set_axis_off()
         for k, swing, canvas, axes in zip(chosen, swings, stages, panels, strict=False):
@@ -216,8 +226,14 @@ def draw_modes(
             draw_outlines(axes, swing, backward, color=SKY, linewidth=1.6, zorder=2)
             draw_beams(axes, swing, forward.nodes, color=BLUE, linewidth=2.6, zorder=4)
             draw_strokes(axes, symbols.all_symbols(forward))
-            axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
-            axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
+            title = f"{k}: {shapes.titles[k]}"
+            if in_space:
+                set_up_in_space(axes, title)
+                axes.auto_scale_xyz(*points.T, had_data=True)
+                fit_in_space(axes, 1.0)
+            else:
+                axes.set_title(title, loc="left")
+                axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
     return figure
 
 

@@ -143,10 +143,11 @@ def mark_hinges(
 def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
-    The curvature includes the jump of a hinge divided by the length of the cell.  So the area of
-    a loop is the dissipated energy per length.  At a vertex, the cell before the vertex is drawn.
+    In space they are about axis 3 of the section.  The curvature includes the jump of a hinge
+    divided by the length of the cell.  So the area of a loop is the dissipated energy per length.
+    At a vertex, the cell before the vertex is drawn.
     """
-    M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
+    M, K = solution.material_at(place).forces[:, -1], solution.strains_at(place)[:, -1]
     with style.panel(ax, (8.0, 5.4)) as axes:
         _draw_path(axes, ax, solution, K, M)
         axes.set_xlabel("curvature K (1/m)")
@@ -172,11 +173,13 @@ def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None 
         points, law = solution.material_at(place), _law(solution, place)
         if law is None or np.isinf(law.limit):
             raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
-        M, jump, losses = points.forces[:, 2], points.jump, points.hinge
+        M, jump, losses = points.forces[:, -1], points.jump, points.hinge
         if solution.numbering.hinge_at(place) is None:  # of the Gauss point that opened most
             cell = solution.numbering.cell(place)
             states = np.array([solution.points_of(n)[cell] for n in range(len(solution))])
-            M, jump, losses = states[:, np.abs(states[-1, :, JUMP]).argmax(), [2, JUMP, HINGE]].T
+            M, jump, losses = states[
+                :, np.abs(states[-1, :, JUMP]).argmax(), [JUMP - 1, JUMP, HINGE]
+            ].T
         lost = float(losses[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Intervals in which the jump only grows or only falls; adjacent intervals share a point.

@@ -58,13 +58,13 @@ def scene_axes(ax: Axes | None, scene: Scene, title: str) -> Iterator[Any]:
     size, projection = (SIZE, "3d") if scene.in_space else (MOST, None)
     with style.panel(ax, size, projection) as axes:
         if scene.in_space:
-            _set_up_in_space(axes, title)
+            set_up_in_space(axes, title)
         else:
             style.plane_axes(axes, title)
         yield axes
 
 
-def _set_up_in_space(axes: Any, title: str) -> None:
+def set_up_in_space(axes: Any, title: str) -> None:
     """Set up axes of a scene in space, seen from a side without perspective."""
     axes.set_proj_type("ortho")
     x, y, z = -FROM_A_SIDE
@@ -129,7 +129,7 @@ def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: fl
     least ``scale`` (m) long.  The user's axes ``ax`` and figures in space keep their size.
     """
     if hasattr(axes, "get_zlim"):
-        _fit_in_space(axes)
+        fit_in_space(axes)
         write_labels(axes, [x._replace(spots=_in_picture(axes, x.spots)) for x in labels])
         return
     axes.margins(MARGIN)
@@ -150,8 +150,11 @@ def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: fl
     _fit(axes, ax, scale)
 
 
-def _fit_in_space(axes: Any) -> None:
-    """Fit limits and numbers of ticks of axes in space to the data, with equal scales."""
+def fit_in_space(axes: Any, filled: float = 0.0) -> None:
+    """Fit limits and numbers of ticks of axes in space to the data, with equal scales.
+
+    The data fill a fraction of the axes; by default there is space for numbers at the axes.
+    """
     from matplotlib.ticker import MaxNLocator
 
     xy, zz = axes.xy_dataLim, axes.zz_dataLim
@@ -161,7 +164,8 @@ def _fit_in_space(axes: Any) -> None:
         getattr(axes, f"set_{name}lim")(at - width, at + width)
         locator = MaxNLocator(max(1, round(5 * width / half.max())), min_n_ticks=1)
         getattr(axes, f"{name}axis").set_major_locator(locator)
-    axes.set_box_aspect(half, zoom=0.9)
+    zoom = filled * np.linalg.norm(half) / np.max(np.abs(PICTURE[3]) @ half)
+    axes.set_box_aspect(half, zoom=zoom or 0.9)
     style.lay_out(axes)
     style.parent_figure(axes).draw_without_rendering()  # projects lines and areas
 

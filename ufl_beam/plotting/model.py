@@ -87,8 +87,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     orange; drives that prescribe a force are hollow.  Notes above the axes replace many equal
     labels.  Labels for which there is no space are omitted.
     """
-    if not scene.in_space:
-        require_independent(scene)
+    require_independent(scene)
     with scene_axes(ax, scene, "") as axes:
         drawing = Drawing(fitted_canvas(scene, ax=ax, filled=0.7))  # with space for loads
         labels, repeated = drawing.grouped()

@@ -62,17 +62,10 @@ Modules that define further results add their pictures; see ``structures/picture
 """
 
 IN_SPACE: dict[type, dict[str, Callable[..., Figure]]] = {
-    Scene: PICTURES[Scene],
-    Solution: {
-        **{
-            x: PICTURES[Solution][x]
-            for x in ("shape", "shapes", "history", "energy", "dissipation")
-        },
-        **{name: partial(draw_shape, quantity=name) for name in COLUMNS},
-    },
+    Solution: PICTURES[Solution] | {name: partial(draw_shape, quantity=name) for name in COLUMNS},
     Extremes: {name: partial(draw_extremes, quantity=name) for name in COMPONENTS},
 }
-"""The same of scenes in space; other pictures are refused."""
+"""The same of scenes in space, where they are others."""
 
 
 def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
@@ -103,8 +96,9 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
 
     Scenes in space are drawn in a view with z up; ``ax`` then are axes in space.  A solution has
     "N", "V", "T", "M", and the components "V2", "V3", "M2", "M3" in axes of the sections.  V and M
-    are drawn as vectors, M on the side of tension.  Extremes have components.  Components of
-    "history" are "u", "v", "w" and their rates, and "rx", "ry", "rz" of the rotation vector.
+    are drawn as vectors, M on the side of tension.  Extremes have components.  Moments of "hinge"
+    and "moment-curvature" are about axis 3.  Components of "history" are "u", "v", "w" and their
+    rates, and "rx", "ry", "rz" of the rotation vector.
 
     Args:
         shown: Object to draw.
@@ -139,10 +133,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     scene = shown if isinstance(shown, Scene) else getattr(shown, "scene", None)
     scene = scene or getattr(getattr(shown, "solution", None), "scene", None)
     if isinstance(scene, Scene) and scene.in_space:
-        kind = next(kind for kind in PICTURES if isinstance(shown, kind))
-        if kind not in IN_SPACE or (quantity in pictures and quantity not in IN_SPACE[kind]):
-            scene.require_plane(f"plot of {quantity or next(iter(pictures))!r}")
-        pictures = IN_SPACE[kind]
+        pictures = next((IN_SPACE[kind] for kind in IN_SPACE if isinstance(shown, kind)), pictures)
     if quantity and quantity not in pictures:
         hint = "; a scene has none before a run" if isinstance(shown, Scene) else ""
         raise ArgumentError(

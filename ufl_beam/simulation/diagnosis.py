@@ -197,15 +197,16 @@ def _singularity(equation: StepEquation, q: Array) -> str:
     if (found := soft_motions(equation)) is None:
         return ""
     x: Array = np.zeros(numbering.size)
-    _, free, sizes, vectors = found
+    K, free, sizes, vectors = found
     x[free], size = vectors[:, -1], sizes[-1]
-    motions = np.abs(x) * numbering.scales
+    motions, forces = np.abs(x) * numbering.scales, np.abs(x[numbering.multipliers])
     largest = float(motions.max())
     if not np.isfinite(largest):
         return ""
-    if largest == 0.0:
-        forces = np.abs(x[numbering.multipliers])
-        names = [str(scene.all_connectors[i]) for i in _named(forces / forces.max())]
+    if largest * scene.size * abs(K).max() <= SINGULAR * forces.max(initial=0.0):
+        joints = {holder: joint for joint in scene.joints for holder in joint.holders}
+        held = (scene.all_connectors[i] for i in _named(forces / (forces.max() or 1.0)))
+        names = [*dict.fromkeys(str(joints.get(x, x)) for x in held)]
         said = (
             f"the tangent stiffness is singular: the constraints of {_list(names)} are not "
             "independent"

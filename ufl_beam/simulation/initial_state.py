@@ -85,8 +85,7 @@ def checked_numbering(
             instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
     require_works(scene, mesh.degree, scheme)
-    if not scene.in_space:
-        require_independent(scene)
+    require_independent(scene)
     warn_of_warping(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)

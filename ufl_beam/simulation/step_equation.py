@@ -290,7 +290,8 @@ class StepEquation:
         """Let loads and supports of another scene begin with the rotations of the nodes."""
         numbering = self.subdomain.numbering
         turns: Array = np.zeros((1, len(numbering.points) + len(numbering.scene.rigid_bodies), 4))
-        for term in self.nodes_in_space:
+        hinges = (x for x in self.connector_terms if hasattr(x, "turns"))  # nodes of no cell
+        for term in (*self.nodes_in_space, *hinges):
             places, nodes = term.turns(numbering)
             turns[0, nodes] = term.states.ravel()[places]
 

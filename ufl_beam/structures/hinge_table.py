@@ -105,7 +105,6 @@ def hinge_table(
         beam.start (0, 0) LS
     """
     require_kind(solution, Solution, "hinge_table: solution")
-    solution.scene.require_plane("hinge_table")
     require_limits(limits, "hinge_table: limits")
     require_kind(n, (int, np.integer), "hinge_table: n")
     known = {*solution.scene.beams, *solution.scene.connectors}

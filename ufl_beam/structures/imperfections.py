@@ -12,7 +12,14 @@ import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.arrays import Array
-from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, shorten
+from ufl_beam.errors import (
+    ArgumentError,
+    require_count,
+    require_kind,
+    require_number,
+    require_vector,
+    shorten,
+)
 from ufl_beam.model import plausibility
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, BodyPoint, Place
@@ -22,7 +29,7 @@ from ufl_beam.model.sections import Section
 
 
 def imperfect(
-    scene: Scene, *, sway: float = 0.0, bow: Mapping[Beam, float] | None = None,
+    scene: Scene, *, sway: float | Point = 0.0, bow: Mapping[Beam, float | Point] | None = None,
     mode: Shapes | None = None, k: int = 0, amplitude: float = 0.0,
 ) -> Scene:  # fmt: skip
     """Return a scene with initial imperfections: the same model in another geometry without stress.
@@ -34,9 +41,11 @@ def imperfect(
     Args:
         scene: Perfect model.
         sway: Inclination of the whole scene, with its lowest beam end fixed: displacement along x
-            divided by height, such as 1/200.
+            divided by height, such as 1/200; in space along x and y, as (1/200, 0), by the height
+            along z.
         bow: Amplitudes of half sine waves of beams as fractions of the distance of their ends, such
-            as ``{column: 1 / 300}``; positive to the left of the direction of the beam.
+            as ``{column: 1 / 300}``; positive to the left of the direction of the beam.  In space
+            two numbers, along the axes 2 and 3 of the section.
         mode: Result of :func:`buckling` or :func:`modes` of ``scene``.
         k: Index of the mode.
         amplitude: Largest displacement of the mode, positive or negative; m.
@@ -56,22 +65,22 @@ def imperfect(
         0.128
     """
     require_kind(scene, Scene, "imperfect: scene")
-    scene.require_plane("imperfect")
-    require_number(sway, "imperfect: sway")
+    lean = _numbers(sway, scene, "imperfect: sway")
     require_number(amplitude, "imperfect: amplitude")
     require_count(k, "imperfect: k", at_least=0)
-    plausibility.check("imperfect", "inclination", sway)
+    plausibility.check("imperfect", "inclination", math.hypot(*lean))
     bows = {} if bow is None else bow
     if not isinstance(bows, Mapping) or not all(isinstance(beam, Beam) for beam in bows):
         raise ArgumentError(
             f"imperfect: bow = {shorten(bow)} must be a dict of beams of the scene, as in "
             'bow={scene["column"]: 1 / 300}'
         )
+    amplitudes = dict[Beam, Array]()
     for beam, size in bows.items():
         if beam not in scene.beams:
             raise ArgumentError(f"imperfect: bow: {not_in(scene, beam)}")
-        require_number(size, f"imperfect: bow of {beam.name}")
-        plausibility.check(f"imperfect: {beam.name}", "bow", size)
+        amplitudes[beam] = _numbers(size, scene, f"imperfect: bow of {beam.name}")
+        plausibility.check(f"imperfect: {beam.name}", "bow", math.hypot(*amplitudes[beam]))
         for joint in scene.joints:
             if any(isinstance(x, Place) and x.beam is beam and 0 < x.s < 1 for x in joint.places):
                 raise ArgumentError(
@@ -84,12 +93,21 @@ def imperfect(
             raise ArgumentError("imperfect: mode is of other beams or bodies")
         if np.iscomplexobj(mode.shapes[:, k : k + 1]):
             raise ArgumentError(f"imperfect: mode {k} is complex; its phases differ")
-    if not sway and not any(bows.values()) and (mode is None or not amplitude):
+    if not any(map(np.any, (lean, *amplitudes.values()))) and (mode is None or not amplitude):
         raise ArgumentError(
             "imperfect: nothing changes the geometry; give sway=, bow= or mode= with amplitude="
         )
-    change = _Change(scene, sway, bows, mode, k, amplitude)
+    change = _Change(scene, lean, amplitudes, mode, k, amplitude)
     return change(scene)  # type: ignore[no-any-return]
+
+
+def _numbers(given: Any, scene: Scene, what: str) -> Array:
+    """Return a number, in space two numbers, as an array, or raise."""
+    if not scene.in_space:
+        return np.array([require_number(given, what)])
+    if np.ndim(given) == 0 and given == 0.0:
+        return np.zeros(2)
+    return np.array(require_vector(given, what))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,33 +115,32 @@ class Displaced:
     """Curve of a beam plus displacements: sway, a half sine wave, and linear interpolation."""
 
     curve: Curve
-    sway: float
-    lowest: float  # y of the points without sway; m
-    bow: Point  # amplitude of the half sine wave; m
+    sway: Array  # displacement by height; (2 or 3,)
+    lowest: float  # height of the points without sway; m
+    bow: Array  # amplitude of the half sine wave; (2 or 3,); m
     s: Array
-    shape: Array  # displacements at the parameters ``s``; (n, 2); m
+    shape: Array  # displacements at the parameters ``s``; (n, 2 or 3); m
 
     def __call__(self, s: float) -> Point:
         """Return the point at a parameter; m."""
-        x, y = self.curve(s)
+        point = np.array(self.curve(s))
         wave = math.sin(math.pi * s) if 0.0 < s < 1.0 else 0.0
-        u, v = (float(np.interp(s, self.s, values)) for values in self.shape.T)
-        return (
-            float(x + self.sway * (y - self.lowest) + self.bow[0] * wave + u),
-            float(y + self.bow[1] * wave + v),
-        )
+        moved = [np.interp(s, self.s, values) for values in self.shape.T]
+        swayed = point + self.sway * (point[-1] - self.lowest)
+        return tuple((swayed + self.bow * wave + moved).tolist())
 
 
 class _Change:
     """Change of geometry; a call returns a record with new beams, bodies and places."""
 
     def __init__(
-        self, scene: Scene, sway: float, bows: Mapping[Beam, float], mode: Shapes | None, k: int,
+        self, scene: Scene, sway: Array, bows: Mapping[Beam, Array], mode: Shapes | None, k: int,
         amplitude: float,
     ) -> None:  # fmt: skip
-        self._sway, self._bows, self._mode, self._k = sway, bows, mode, k
+        self._sway, self._bows, self._mode, self._k = np.append(sway, 0.0), bows, mode, k
         self._amplitude = amplitude
-        self._lowest = min([y for beam in scene.beams for _, y in beam.ends], default=0.0)
+        heights = [point[-1] for beam in scene.beams for point in beam.ends]
+        self._lowest = min(heights, default=0.0)
         self._made: dict[int, tuple[Any, Any]] = {}  # by id; the reference keeps the id in use
 
     def __call__(self, old: Any) -> Any:
@@ -158,26 +175,33 @@ class _Change:
         return old
 
     def _curve(self, beam: Beam) -> Displaced:
-        (x0, y0), (x1, y1) = beam.ends
-        size = self._bows.get(beam, 0.0)
+        along, up = np.array(beam.ends[1]) - beam.ends[0], np.array(beam.up)
+        size = self._bows.get(beam, np.zeros(len(self._sway) - 1))
         s = np.array([0.0, 1.0])
         if self._mode is not None:
             numbering = self._mode.numbering
             s, pieces = numbering.parameters(beam), 1 if numbering.mesh.degree == 1 else 12
             s = np.interp(np.arange(pieces * (len(s) - 1) + 1) / pieces, np.arange(len(s)), s)
         shape = np.array([self._motion(beam.at(float(x))) for x in s])
-        bow = (-size * (y1 - y0), size * (x1 - x0))
+        if len(along) == 2:
+            bow = size * (-along[1], along[0])
+        else:
+            third = np.cross(along, up)
+            third *= np.linalg.norm(along) / np.linalg.norm(third)
+            bow = size @ [np.cross(third, along / np.linalg.norm(along)), third]
         return Displaced(beam.curve, self._sway, self._lowest, bow, s, shape)
 
     def _motion(self, place: AttachmentPoint) -> Array:
-        """Return the displacement of a place in the mode; (2,); m."""
+        """Return the displacement of a place in the mode; (2 or 3,); m."""
+        d = len(place.point)
         if self._mode is None:
-            return np.zeros(2)
-        return np.asarray(self._amplitude * self._mode.shape(self._k, place)[:2])
+            return np.zeros(d)
+        return np.asarray(self._amplitude * self._mode.shape(self._k, place)[:d])
 
     def _point(self, place: BodyPoint) -> Point:
-        (x, y), (u, v) = place.point, self._motion(place)
-        return float(x + self._sway * (y - self._lowest) + u), float(y + v)
+        point = np.array(place.point)
+        swayed = point + self._sway * (point[-1] - self._lowest)
+        return tuple((swayed + self._motion(place)).tolist())
 
 
 def _rebuilt(old: Any, **changed: Any) -> Any:

@@ -172,7 +172,8 @@ def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None =
     drift = quantity == "drift"
     values = np.asarray(100 * storeys.ratio if drift else storeys.shear / factor)
     label = "drift ratio (%)" if drift else f"storey shear ({prefix}N)"
-    edges = [place.point[1] for place in storeys.levels]
+    axis = "xyz"[len(storeys.levels[0].point) - 1]
+    edges = [place.point[-1] for place in storeys.levels]
     with style.panel(ax, (5.0, 6.0)) as axes:
         style.zero_lines(axes, y=False)
         for name, extreme, color in (("largest", np.nanmax, RED), ("least", np.nanmin, BLUE)):
@@ -180,7 +181,7 @@ def draw_storeys(storeys: Storeys, *, quantity: str = "drift", ax: Axes | None =
             axes.plot(profile, np.repeat(edges, 2)[1:-1], color=color, label=name)
         axes.set_yticks(edges)
         axes.grid(axis="y", linewidth=0.8)
-        axes.set(xlabel=label, ylabel="y (m)")
+        axes.set(xlabel=label, ylabel=f"{axis} (m)")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
     return style.parent_figure(axes)
 
@@ -332,6 +333,7 @@ def _of_forces(draw: Any, names: Sequence[str] = ("M", "N", "V")) -> dict[str, A
 
 
 IN_SPACE[LoadCombinations] = _of_forces(draw_combinations, style.COMPONENTS)
+IN_SPACE[SpectralResponse] = _of_forces(draw_response, style.COMPONENTS)
 PICTURES.update({
     Calibration: {"fit": draw_calibration},
     Storeys: _of_forces(draw_storeys, ("drift", "shear")),

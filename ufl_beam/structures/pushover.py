@@ -44,7 +44,6 @@ from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.output.history import Events
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.initial_state import mesh_of
@@ -52,6 +51,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.structures.pushover_result import HingeFormation, Pushover
 
+DISPLACEMENTS = "u", "v", "w"
 PATTERNS = "mode", "uniform", "triangular"
 TIMES = -1.0, 0.0, 0.5, 2.0, 5.0, *(10.0**k for k in range(1, 7))
 """Times (s) at which a prescribed motion or a connector force must equal its value at 1 s.  They
@@ -98,10 +98,10 @@ def pushover(
             loads of the scene; m.
         pattern: Distribution of the pushing forces: "mode", mass times the elastic mode with the
             largest effective mass of the first six; "uniform", mass; "triangular", mass times the
-            height above the lowest point; or a list of :class:`PointLoad`, :class:`LineLoad` and
-            :class:`Gravity`. The sum of the forces in the direction of the component is scaled to
-            the base shear.
-        component: "u" to push along x, or "v" along y.
+            height above the lowest point, along y, in space z; or a list of :class:`PointLoad`,
+            :class:`LineLoad` and :class:`Gravity`. The sum of the forces in the direction of the
+            component is scaled to the base shear.
+        component: "u" to push along x, "v" along y, or in space "w" along z.
         steps: Number of steps to the target.
         newton: Tolerances and options of Newton's method.
         mesh: Discretization; by default the cells of the beams.
@@ -129,13 +129,14 @@ def pushover(
         beam.start (0, 0) opens
     """
     require_kind(scene, Scene, "pushover: scene")
-    scene.require_plane("pushover")
     require_kind(place, Place, "pushover: place")
     target = require_number(target, "pushover: target")
     if target == 0.0:
         raise ArgumentError("pushover: target = 0 leads nowhere; give a displacement in m")
-    if not isinstance(component, str) or component not in COMPONENTS[:2]:
-        raise ArgumentError(f"pushover: component = {shorten(component)} must be 'u' or 'v'")
+    names = DISPLACEMENTS[: len(place.point)]
+    if not isinstance(component, str) or component not in names:
+        options = " or ".join(map(repr, names))
+        raise ArgumentError(f"pushover: component = {shorten(component)} must be {options}")
     far = target / scene.size
     plausibility.check("pushover", "target over the size of the scene", far)
     steps = require_count(steps, "pushover: steps")
@@ -156,7 +157,7 @@ def pushover(
                 f"pushover: {owner} depends on time, and a pushover has none; make it constant, or "
                 "use ub.follow"
             )
-    axis = COMPONENTS.index(component)
+    axis = names.index(component)
     # Loads begin and end at vertices, which must be the same in all steps below
     placed = [with_amplitude(load, Constant(0.0)) for load in loads]
     scene = replace(scene, damping=(), loads=[*scene.loads, *placed])
@@ -173,7 +174,7 @@ def pushover(
         shape = _shape(pattern, place, axis, steady, start, mesh, masses)
         loads = tuple(_forces(scene, axis, shape))
     sum_of_forces = sum(_along(load, axis, numbering) for load in loads)
-    largest = sum(_along(load, i, numbering, abs) for load in loads for i in (0, 1))
+    largest = sum(_along(load, i, numbering, abs) for load in loads for i in range(len(names)))
     if not abs(sum_of_forces) > LEAST_MOTION * largest:
         raise ArgumentError(
             f"pushover: the forces of the pattern have no sum along {component}, so that there is "
@@ -183,7 +184,7 @@ def pushover(
     loaded = replace(steady, loads=[*steady.loads, *unit])
     linear = Linearization(loaded, start, abs(sum_of_forces), mesh).linear_change("pushover")[0]
     moved = float(values_at(numbering, place, linear[None])[0, axis])
-    if not abs(moved) > LEAST_MOTION * np.abs(linear[numbering.dofs[:, :2]]).max():
+    if not abs(moved) > LEAST_MOTION * np.abs(linear[numbering.dofs[:, : len(names)]]).max():
         raise ArgumentError(
             f"pushover: the pattern does not move {component} of {place}; give another control "
             "place or component"
@@ -265,7 +266,7 @@ def _main_mode(
     m = np.array([mass for _, mass in masses])
     effective = []
     for k in range(len(shapes)):
-        motion = np.array([shapes.shape(k, at)[:2].real for at, _ in masses])
+        motion = np.array([shapes.shape(k, at)[: len(at.point)].real for at, _ in masses])
         effective.append(float((m @ motion[:, axis]) ** 2 / (m @ motion**2).sum()))
     k = int(np.argmax(effective))
     return lambda at: float(shapes.shape(k, at)[axis].real), 1.0 / float(shapes.frequencies[k])
@@ -284,23 +285,23 @@ def _shape(
         return lambda at: 1.0
     form: Shape
     if pattern == "triangular":
-        lowest = min(at.point[1] for at, _ in masses)
-        lowest = min([lowest, *(support.place.point[1] for support in scene.supports)])
-        form, largest = (lambda at: float(at.point[1] - lowest)), scene.size
+        lowest = min(at.point[-1] for at, _ in masses)
+        lowest = min([lowest, *(support.place.point[-1] for support in scene.supports)])
+        form, largest = (lambda at: float(at.point[-1] - lowest)), scene.size
     else:
         (form, _), largest = _main_mode(scene, start, mesh, masses, axis), 1.0
     at_place = form(place)
     if not abs(at_place) > LEAST_MOTION * largest:
         raise ArgumentError(
-            f"pushover: the pattern {pattern!r} does not move {COMPONENTS[axis]} of {place}; give "
-            "another control place or pattern"
+            f"pushover: the pattern {pattern!r} does not move {DISPLACEMENTS[axis]} of {place}; "
+            "give another control place or pattern"
         )
     return lambda at: form(at) / at_place
 
 
 def _forces(scene: Scene, axis: int, shape: Shape) -> list[Load]:
     """Return loads of mass times the shape along an axis, on beams and point masses."""
-    direction = (1.0, 0.0) if axis == 0 else (0.0, 1.0)
+    direction = np.eye(3 if scene.in_space else 2)[axis]
     loads: list[Load] = []
     for beam in scene.beams:
         if rhoA := beam.section.rhoA:
@@ -308,13 +309,11 @@ def _forces(scene: Scene, axis: int, shape: Shape) -> list[Load]:
             def along(s: float, beam: Any = beam) -> float:
                 return shape(beam.at(s))
 
-            force = (rhoA * direction[0], rhoA * direction[1])
-            loads.append(LineLoad(beam, force, profile=along))
+            loads.append(LineLoad(beam, tuple(rhoA * direction), profile=along))
     constrained = {support.place for support in scene.supports if axis in support.held}
     for at, mass, _ in point_masses(scene):
         if mass and at not in constrained:
-            size = mass * shape(at)
-            loads.append(PointLoad(at, (size * direction[0], size * direction[1])))
+            loads.append(PointLoad(at, tuple(mass * shape(at) * direction)))
     return loads
 
 
@@ -341,7 +340,7 @@ def _follow(
     **options: Any,
 ) -> tuple[Path, Events, str]:  # fmt: skip
     """Follow the path to the target; return it, its events, and the reason of an early end."""
-    axis, events = COMPONENTS.index(control.component), Events()
+    axis, events = DISPLACEMENTS.index(control.component), Events()
     before = 0.0 if start is None else float(start.displacement(control.place)[-1, axis])
     control = replace(control, end=before + target)
     try:

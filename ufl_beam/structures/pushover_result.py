@@ -113,7 +113,7 @@ class Pushover(Rich):
     Attributes:
         path: Equilibrium path, a :class:`Path`; its load factor is the base shear (N).
         place: Control place.
-        component: Controlled component, "u" or "v".
+        component: Controlled component, "u", "v" or "w".
         target: Displacement asked for; m.
         displacement: Displacement of the control place since the loads of the scene; (n+1,); m.
         base_shear: Sum of the pushing forces in the direction of the component; (n+1,); N.

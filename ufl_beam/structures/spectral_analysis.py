@@ -4,12 +4,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.analysis.linearization import Linearization, linear_forces_of_cells
+from ufl_beam.analysis.linearization import (
+    Linearization,
+    linear_forces_in_space,
+    linear_forces_of_cells,
+)
 from ufl_beam.analysis.modes import Modes, modes
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
@@ -19,7 +24,7 @@ from ufl_beam.errors import (
     require_count,
     require_kind,
     require_number,
-    require_vector,
+    require_point,
     shorten,
     warn,
 )
@@ -28,8 +33,9 @@ from ufl_beam.model.bodies import AttachmentPoint, Member
 from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.model.scene import Scene, index_of
 from ufl_beam.model.supports import Support
-from ufl_beam.output.section_forces import Diagram, ForcesAlongCells
+from ufl_beam.output.section_forces import Diagram, DiagramInSpace, ForcesAlongCells
 from ufl_beam.simulation.initial_state import StateOf, chosen_state
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.structures.spectra import Spectrum, spectral_accelerations
 
 RULES = "CQC", "SRSS"
@@ -53,8 +59,10 @@ class SpectralResponse(Rich):
         mass: Mass that moves; kg.
         correlation: Coefficients ρ of the combination; (n, n).
         resultants: Peak forces on the ends of cells in each mode, ``cell_number`` of loops.h;
-            (n, 9, num_cells).
-        reactions: Peak force (x, y) and moment of each support in each mode; (n, num_supports, 3).
+            (n, 9, num_cells).  In space, peak section forces at the start, middle and end of cells;
+            (n, num_cells, 3, 6).
+        reactions: Peak force (x, y) and moment of each support in each mode, in space force and
+            moment along x, y, z; (n, num_supports, 3 or 6).
 
     Example:
         >>> response = st.response_spectrum_analysis(scene, lambda T: 3.0, n=4, direction=(0, 1))
@@ -66,7 +74,7 @@ class SpectralResponse(Rich):
     """
 
     modes: Modes
-    direction: tuple[float, float]
+    direction: tuple[float, ...]
     accelerations: Array
     participation: Array
     effective_masses: Array
@@ -107,6 +115,8 @@ class SpectralResponse(Rich):
     def peaks(self, place: AttachmentPoint) -> Array:
         """Return the peak motion (u, v, ψ) of a place in each mode, with its sign; (n, 3).
 
+        In space, return displacements, and rotations about axes of the node; (n, 6).
+
         Raises:
             ArgumentError: The place is not in the scene.
         """
@@ -114,10 +124,10 @@ class SpectralResponse(Rich):
         return np.array([size * self.modes.shape(k, place).real for k, size in enumerate(sizes)])
 
     def displacement(self, place: AttachmentPoint) -> Array:
-        """Return the combined motion (u, v, ψ) of a place relative to the ground; (3,); m, rad."""
+        """Return the combined :meth:`peaks` of a place; (3,), in space (6,); m, rad."""
         return self.combine(self.peaks(place))
 
-    def diagram(self, beam: Member, *, points: int = 9) -> Diagram:
+    def diagram(self, beam: Member, *, points: int = 9) -> Diagram | DiagramInSpace:
         """Return combined section forces along a beam, with ``points`` points in each cell.
 
         Raises:
@@ -126,14 +136,21 @@ class SpectralResponse(Rich):
         require_number(points, "diagram: points", at_least=2)
         numbering = self.modes.numbering
         s, fractions = numbering.parameters(beam), np.arange(int(points)) / (int(points) - 1)
-        cells, along = numbering.cells_of(beam), ForcesAlongCells(numbering)
+        cells, at = numbering.cells_of(beam), s[:-1, None] + fractions * np.diff(s)[:, None]
+        if self.scene.in_space:
+            x = fractions[:, None]
+            parabolas = np.hstack([(1 - x) * (1 - 2 * x), 4 * x * (1 - x), x * (2 * x - 1)])
+            combined = self.combine(parabolas @ self.resultants[:, cells])
+            return DiagramInSpace(at.ravel(), *combined.reshape(-1, 6).T)
+        along = ForcesAlongCells(numbering)
         q = self.modes.q[along.dofs[cells]]
         peaks = [along(cells, fractions, forces[:, cells], q) for forces in self.resultants]
-        at = s[:-1, None] + fractions * np.diff(s)[:, None]
         return Diagram(at.ravel(), *self.combine(peaks).reshape(-1, 3).T)
 
     def reaction(self, support: Support) -> Array:
         """Return the combined force (x, y) and moment of a support; (3,); N, N, N m.
+
+        In space, return force and moment along x, y, z; (6,).
 
         Raises:
             ArgumentError: The support is not in the scene.
@@ -166,7 +183,7 @@ def response_spectrum_analysis(
     spectrum: Spectrum,
     *,
     n: int = 10,
-    direction: tuple[float, float] = (1.0, 0.0),
+    direction: Sequence[float] | None = None,
     damping: float = 0.05,
     rule: str = "CQC",
     at: StateOf | None = None,
@@ -185,7 +202,7 @@ def response_spectrum_analysis(
         spectrum: Spectral acceleration (m/s²) as a function of the period (s), or (periods,
             accelerations), for the damping ratio.
         n: Number of modes; fewer if the scene has fewer.
-        direction: Direction of the ground motion; only its direction matters.
+        direction: Direction of the ground motion, by default x; only its direction matters.
         damping: Damping ratio of all modes for CQC; damping of the scene is ignored.
         rule: "CQC" or "SRSS".
         at: Static solution about whose last state the scene vibrates; responses are beyond this
@@ -207,11 +224,15 @@ def response_spectrum_analysis(
     """
     what = "response_spectrum_analysis"
     require_kind(scene, Scene, f"{what}: scene")
-    scene.require_plane(what)
     n = require_count(n, f"{what}: n")
-    x, y = require_vector(direction, f"{what}: direction")
-    if not (size := math.hypot(x, y)) > 0.0:
-        raise ArgumentError(f"{what}: direction = {shorten(direction)} has no length")
+    along_x = (1.0, 0.0, 0.0)[: 3 if scene.in_space else 2]
+    toward = np.array(require_point(direction or along_x, f"{what}: direction"))
+    if len(toward) != len(along_x) or not (size := math.hypot(*toward)) > 0.0:
+        raise ArgumentError(
+            f"{what}: direction = {shorten(direction)} must have {len(along_x)} components, and a "
+            "length"
+        )
+    toward /= size
     damping = require_number(damping, f"{what}: damping", positive=True)
     if damping >= 1.0:
         raise ArgumentError(f"{what}: damping = {damping:g} must be below 1")
@@ -234,24 +255,23 @@ def response_spectrum_analysis(
     _require_vibration(basis, what)
     small = Linearization(undamped if at else replace(undamped, loads=()), at, mesh=mesh)
     shapes, omega = np.asarray(basis.shapes.real), basis.omega
-    toward, mass = small.participation(np.array([x, y]) / size)
+    pushed, mass = small.participation(toward)
     own = np.einsum("ik,ik->k", shapes, small.masses @ shapes)
-    along = shapes.T @ toward
+    along = shapes.T @ pushed
     participation, effective = along / own, along**2 / own
     accelerations = spectral_accelerations(spectrum, np.asarray(2.0 * math.pi / omega), what)
     sizes = participation * accelerations / omega**2
-    forces = small.support_forces(shapes, omega) * sizes
-    places = [small.numbering.node(support.place) for support in scene.supports]
-    reactions = np.array([forces[dofs].T for dofs in places]).reshape(len(places), len(sizes), 3)
+    reactions = (small.support_forces(shapes, omega) * sizes).transpose(2, 0, 1)
     response = SpectralResponse(
-        replace(basis, scene=scene), (x / size, y / size), accelerations, participation, effective,
-        mass, cqc(omega, damping) if rule == "CQC" else np.eye(len(omega)),
-        _resultants(basis, sizes), reactions.transpose(1, 0, 2),
+        replace(basis, scene=scene), tuple(map(float, toward)), accelerations, participation,
+        effective, mass, cqc(omega, damping) if rule == "CQC" else np.eye(len(omega)),
+        _resultants(basis, sizes, at), reactions,
     )  # fmt: skip
     if response.missing_mass > 1.0 - LEAST_MASS:
         warn(
             f"{what}: the {len(basis)} modes have {1.0 - response.missing_mass:.0%} of the mass "
-            f"along ({x:g}, {y:g}); 90 % are usual (EN 1998-1, 4.3.3.3.1): give a larger n"
+            f"along ({', '.join(f'{x:g}' for x in toward)}); 90 % are usual (EN 1998-1, "
+            "4.3.3.3.1): give a larger n"
         )
     return response
 
@@ -281,9 +301,13 @@ def cqc(omega: Array, damping: float) -> Array:
     return np.asarray(above / below)
 
 
-def _resultants(basis: Modes, sizes: Array) -> Array:
-    """Return the peak forces of stress and inertia on the ends of cells; (n, 9, num_cells)."""
-    forces = linear_forces_of_cells(basis.numbering, basis.q, basis.section_law)
+def _resultants(basis: Modes, sizes: Array, at: Solution | None) -> Array:
+    """Return the resultants of a :class:`SpectralResponse`."""
+    if basis.scene.in_space:
+        given = None if at is None else at.forces_in_middle(-1)
+        forces = linear_forces_in_space(basis.numbering, basis.q, basis.turns, given)
+    else:
+        forces = linear_forces_of_cells(basis.numbering, basis.q, basis.section_law)
     peaks = []
     for shape, size, omega in zip(basis.shapes.real.T, sizes, basis.omega, strict=True):
         x = np.ascontiguousarray(size * shape)

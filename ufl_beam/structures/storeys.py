@@ -101,7 +101,7 @@ def storeys(
 
     Raises:
         ArgumentError: A level is not above the one before it, nothing is cut above a level, or a
-            body is cut; in space, there is no direction, or a link or connector is cut.
+            body is cut; in space, there is no direction.
 
     Example:
         >>> mast = ub.Beam((0, 0), (0, 3), section)
@@ -167,13 +167,9 @@ def shears_above(solution: Solution, elevations: Array, tolerance: float, ahead:
             cut_cells.append((k, int(cell), float(fraction), 1 if above[cell, 1] else -1))
         connectors = _cut_connectors(scene, elevation, tolerance)
         for connector, sign in connectors:
-            if scene.in_space:
-                raise ArgumentError(
-                    f"storeys: {connector} is cut just above the level z = {elevation:g} m; in "
-                    "space give levels at which only beams are cut"
-                )
             force = solution.connector(connector).force
-            shear[:, k] += sign * force * (solution.directions(connector) @ ahead)
+            directions = solution.directions(connector)[:, : len(ahead)]
+            shear[:, k] += sign * force * (directions @ ahead)
         if not connectors and not any(cut[0] == k for cut in cut_cells):
             raise ArgumentError(
                 f"storeys: nothing is cut just above the level {axis} = {elevation:g} m; give a "
