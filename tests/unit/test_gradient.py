@@ -4,6 +4,7 @@
 import inspect
 import math
 from dataclasses import replace
+from itertools import pairwise
 from functools import partial
 from operator import itemgetter
 
@@ -357,6 +358,42 @@ def test_linear_numbers_need_one_scene():
     _, found, scenes = counted_gradient(product, {"modulus": 2e8, "inertia": 0.02})
     assert scenes == 1 + 2 + 4 * 2
     assert found * [2e8, 0.02] == pytest.approx(2 * [by[0] * 4e6], rel=1e-9)
+
+
+def row(kind, *numbers, modulus=1.0):
+    """Beams in a row, with a number of the section of each."""
+    sections = [
+        ub.Section(**{"EA": 2e9, "GA": 7e8, "EI": 4e6, "rhoA": 60.0, "rhoI": 0.1} | {kind: x})
+        for x in (numbers if kind != "EI" else [modulus / x for x in numbers])
+    ]
+    beams = [ub.Beam((k, 0), (k + 1, 0), s, cells=1) for k, s in enumerate(sections)]
+    joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
+    fixed = [ub.Clamped(beams[0].start)]
+    return ub.Scene(beams, joints=joints, supports=fixed, loads=[ub.Gravity()])
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "more", "scenes"),
+    [
+        ("EA", 2e9, {}, 1 + 2 + (1 + 4)),  # each number depends on one parameter, linearly
+        ("EI", 1 / 4e6, {}, 1 + 2 + (4 + 4)),  # not linearly
+        ("rhoI", 0.1, {}, 1 + 2 + 2 + 2 * (1 + 3)),  # masses of nodes depend on two neighbours
+        ("EI", 1 / 4e6, {"modulus": 1.0}, 1 + 2 + 2 * 2 + 4 * 13),  # on one, and on the modulus
+    ],
+)
+def test_many_parameters_change_in_few_scenes(kind, value, more, scenes):
+    """Derivatives by each parameter are those by this parameter alone."""
+
+    def model(modulus=1.0, **values):
+        known = {f"x{k}": value * (1 + k / 20) for k in range(12)} | values
+        return row(kind, *known.values(), modulus=modulus)
+
+    at = {f"x{k}": value * (1 + k / 20) for k in range(12)} | more
+    _, found, number = counted_gradient(model, at)
+    assert number == scenes
+    for k, name in [*enumerate(at)][::3]:
+        _, (alone,), _ = counted_gradient(model, {name: at[name]})
+        assert found[k] == pytest.approx(alone, rel=1e-8)
 
 
 def test_functions_of_time_may_depend_on_parameters():

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.analysis.neighbouring_scenes import Beside, NeighbouringScene, Numbers, alike
-from ufl_beam.arrays import Array, State
+from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
 from ufl_beam.discretization.cells_in_space import TURNS, turned_further
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -82,6 +82,9 @@ the range of a parameter.  The weight of the position 0 makes the sum of the wei
 TOGETHER = 1.0, 1.5
 """Least and largest step of a parameter in the scenes where all parameters change, as a multiple
 of the step of :data:`MODEL_STEP`."""
+
+FEW = 8
+"""Largest number of parameters that change one by one in the scenes for differences of numbers."""
 
 MOST_SUBSTEPS = 1000
 """Number of substeps of divided steps that are stored; the number of steps if it is larger."""
@@ -326,8 +329,8 @@ class Case:
             warnings.simplefilter("ignore", ModelWarning)
             if self.start is not None or run.begins_with_impact:
                 scenes: list[list[Any]] = [[*self.simulations(x, MODEL_STEP)] for x in names]
-            elif (linear := self._linear(run, t1)) is not None:
-                return linear
+            elif (found := self._differenced(run, t1)) is not None:
+                return found
             else:
                 scenes = [
                     [NeighbouringScene(run, scene) for scene in self.scenes(name, MODEL_STEP)]
@@ -342,40 +345,44 @@ class Case:
                 )
         return Beside(scenes, np.array([self.weights(name, MODEL_STEP) for name in names]))
 
-    def _linear(self, run: Simulation, t1: float) -> Beside | None:
-        """Return one scene for each parameter, if all numbers are linear in all parameters.
+    def _differenced(self, run: Simulation, t1: float) -> Beside | None:
+        """Return derivatives of all numbers, or a scene for each parameter if all are linear.
 
-        Two more scenes show this, in which all parameters change in different proportions.  Their
-        changes cancel unless a number depends on a square of a parameter or on a product of two.
+        Two scenes in which all parameters change in different proportions show whether numbers are
+        linear.  Their changes cancel unless a number depends on a square of a parameter or on a
+        product of two.  Many parameters change together, all or every second one, if each number
+        depends on one of them at most.
         """
-        numbers, values = Numbers(run, t1), np.array([*self.at.values()])
+        every, values = np.arange(len(self.at)), np.array([*self.at.values()])
         steps = np.array([self._step(name, MODEL_STEP) for name in self.at])
         far = np.random.default_rng(0).uniform(*TOGETHER, len(steps)) * steps
-        found = Beside([], 1 / steps[:, None], [])
+        numbers = Numbers(run, t1)
+
+        def beside(k: float, some: Index) -> NeighbouringScene:
+            changed = values.copy()
+            changed[some] += k * far[some]
+            scene = self.scene(dict(zip(self.at, map(float, changed), strict=True)))
+            return NeighbouringScene(run, scene)
+
         try:
-            both = [NeighbouringScene(run, self._at(values + k * far)) for k in (-1, 1)]
-            if not numbers.are_linear(both):
-                return None
-            for p, step in enumerate(steps):
-                changed = values.copy()
-                changed[p] += step
-                other = NeighbouringScene(run, self._at(changed))
-                if (changes := numbers.changes(other)) is None:
-                    return None
-                found.scenes.append([other])
-                if found.rows is not None and not numbers.moves_alike(other):
-                    found.rows = None  # C needs the terms of all scenes
-                    for some in found.scenes[:-1]:
-                        some[:] = [NeighbouringScene(run, x.scene) for x in some]
-                if found.rows is not None:
-                    found.rows.append([x / step if x.any() else None for x in changes])
-                    other.forget()
+            both = [beside(k, every) for k in (-1, 1)]
+            linear = numbers.are_linear(both)
+            if not all(map(numbers.moves_alike, both)):  # C needs the terms of all scenes
+                one_each = [[beside(1, every[p : p + 1])] for p in every if linear]
+                return Beside(one_each, 1 / far[:, None]) if linear else None
+            stencil = {1: 1.0} if linear else dict(zip(*[*STENCILS.items()][0], strict=True))
+            for n in (1, 2, len(every)) if len(every) > FEW else (len(every),):
+                rows = list[dict[int, Array]]()
+                for some in (every[k::n] for k in range(n)):
+                    if (found := numbers.derivatives(beside, far, some, stencil)) is None:
+                        break
+                    rows = [x | y for x, y in zip(rows, found, strict=True)] if rows else found
+                else:
+                    both[1].forget()
+                    return Beside([both[1:]] * len(every), 1 / steps[:, None], rows)
         except ArgumentError:
             return None
-        return found
-
-    def _at(self, values: Array) -> Scene:
-        return self.scene(dict(zip(self.at, map(float, values), strict=True)))
+        return None
 
 
 class StepDerivatives:
@@ -399,7 +406,7 @@ class StepDerivatives:
 
     def __init__(self, simulation: Simulation, beside: Beside, states: int) -> None:
         weights, size = beside.weights, simulation.subdomain.size
-        P, rows = len(weights), beside.derivatives()
+        P, rows = len(weights), None if beside.rows is None else iter(beside.rows)
         equation, A = simulation.equation, simulation.equation.A
         for k, support in enumerate(simulation.scene.supports):
             here = support.moving.get(5)  # a rotation in space, which is no sum of unknowns

@@ -138,8 +138,10 @@ def gradient(
         starts = adjoint.run(ends)
         history = _History(run.solution, of, reduce)
         found = adjoint.reverse(ends, starts, *history.derivatives_by_motion())
+        others = {other for some in beside.scenes for other in some}
+        moved = {other for other in others if history.change_in(other.numbering)}
         for p, (name, some) in enumerate(zip(at, beside.scenes, strict=True)):
-            if any(history.change_in(other.numbering) for other in some):
+            if moved.intersection(some):
                 numberings = [
                     DofNumbering(x, run.numbering.mesh) for x in case.scenes(name, MODEL_STEP)
                 ]

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.model.connector_law import ForceLaw
@@ -74,18 +74,14 @@ class Beside:
     Attributes:
         scenes: The scenes of each parameter.
         weights: Weights of the scenes in derivatives; (P, n).
-        rows: Derivatives of all :class:`Numbers` by each parameter, None where they are zero, if
-            functions of time are the same in all scenes; the scenes have forgotten their terms.
-            Else None.
+        rows: Derivatives of each of the :class:`Numbers` by the parameters on which it depends, by
+            their indices, if functions of time are the same in all scenes; the scenes have
+            forgotten their terms.  Else None.
     """
 
     scenes: list[list[Any]]
     weights: Array
-    rows: list[list[Array | None]] | None = None
-
-    def derivatives(self) -> Iterator[list[Array | None]] | None:
-        """Return an iterator over the derivatives of each number by all parameters, if known."""
-        return None if self.rows is None else iter([list(x) for x in zip(*self.rows, strict=True)])
+    rows: list[dict[int, Array]] | None = None
 
     def terms(self, i: int) -> list[list[Any]]:
         """Return the terms of the scenes with an index; none if the scenes have forgotten them."""
@@ -139,7 +135,7 @@ class Numbers:
 
     def changes(self, other: Any) -> list[Array] | None:
         """Return the changes of all numbers in a scene; None if its terms differ in more."""
-        if not alike(self._run, other):
+        if self._others or not alike(self._run, other):
             return None
         terms = [*zip(self._run.equation.terms, other.equation.terms, strict=True)]
         if not all(here.is_like(there) for here, there in terms):
@@ -154,30 +150,66 @@ class Numbers:
             found.append(np.where(np.isfinite(change), change, 0.0))
         return found
 
+    def derivatives(
+        self, beside: Callable[[float, Index], Any], far: Array, some: Index,
+        stencil: Mapping[int, float],
+    ) -> list[dict[int, Array]] | None:  # fmt: skip
+        """Return the rows of :class:`Beside` by some parameters, from scenes in which all change.
+
+        They are None if a number depends on two of the parameters.  A scene for each bit of their
+        order tells these apart: in it the parameters with this bit change, and a number changes as
+        with all of them or not at all.
+
+        Args:
+            beside: Function that returns a scene in which parameters change by a multiple of
+                ``far``.
+            far: Changes of all parameters; (P,).
+            some: Indices of the parameters.
+            stencil: Weights of the multiples in the derivatives.
+        """
+        if (whole := self.changes(beside(1, some))) is None:
+            return None
+        places, order = [np.zeros(x.shape, dtype=np.intp) for x in whole], np.arange(len(some))
+        for bit in range(int(order[-1]).bit_length()):
+            if (part := self.changes(beside(1, some[order >> bit & 1 == 1]))) is None:
+                return None
+            for place, x, y in zip(places, whole, part, strict=True):
+                if y[y != x].any():
+                    return None
+                place[y != 0] |= 1 << bit
+        slopes = [stencil[1] * x for x in whole]
+        for k in {*stencil} - {1}:
+            if (more := self.changes(beside(k, some))) is None:
+                return None
+            slopes = [slope + stencil[k] * x for slope, x in zip(slopes, more, strict=True)]
+        return [
+            {
+                int(some[k]): np.where(place == k, slope, 0.0) / far[some[k]]
+                for k in np.unique(place[x != 0])
+            }
+            for place, slope, x in zip(places, slopes, whole, strict=True)
+        ]
+
     def are_linear(self, both: Sequence[Any]) -> bool:
-        """Return whether the changes of all numbers in two opposite scenes cancel."""
-        if self._others or (low := self.changes(both[0])) is None:
+        """Return whether changes of numbers and functions in two opposite scenes cancel."""
+        low, high = map(self.changes, both)
+        if low is None or high is None or not all(map(_cancel, low, high, self._here)):
             return False
-        high = self.changes(both[1])
-        cancel = high is not None and all(map(_cancel, low, high, self._here))
-        return cancel and self._moves_linearly(both)
+        of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
+        for here, *others in of_three:
+            if not all(same_function(here, other) for other in others):
+                at, *ends = np.array([[f(float(t)) for t in self._times] for f in (here, *others)])
+                if not _cancel(*(x - at for x in ends), at):
+                    return False
+        return True
 
     def _functions(self, of: Any) -> list[TimeFunction]:
         return [function for _, function in of.scene.time_functions()]
 
-    def _moves_linearly(self, both: Sequence[Any]) -> bool:
-        of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
-        for here, *others in of_three:
-            if not all(same_function(here, other) for other in others):
-                at, low, high = np.array(
-                    [[f(float(t)) for t in self._times] for f in (here, *others)]
-                )
-                if not _cancel(low - at, high - at, at):
-                    return False
-        return True
-
     def moves_alike(self, other: Any) -> bool:
         """Return whether all functions of time and dead loads are the same in a scene."""
+        if not alike(self._run, other):
+            return False
         same = all(map(same_function, self._functions(self._run), self._functions(other)))
         terms = zip(self._run.equation.terms, other.equation.terms, strict=True)
         return same and not any(here.differs(there) for here, there in terms)

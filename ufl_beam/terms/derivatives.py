@@ -50,7 +50,7 @@ class Neighbours:
 
     def __init__(
         self, term: Any, terms: Sequence[Sequence[Any]], weights: Array, size: int,
-        rows: Iterator[list[Array | None]] | None = None,
+        rows: Iterator[dict[int, Array]] | None = None,
     ) -> None:  # fmt: skip
         self._rows, self.number = rows, 0 if rows is not None else weights.shape[1]
         self.term, self.terms, self.weights, self.size = term, terms, weights, size
@@ -77,9 +77,8 @@ class Neighbours:
         reference = values(self.term)
         derivatives = np.zeros((len(self), *np.shape(reference)))
         if self._rows is not None:
-            for p, row in enumerate(next(self._rows)):
-                if row is not None:
-                    derivatives[p], self.enters[p] = row, True
+            for p, row in next(self._rows).items():
+                derivatives[p], self.enters[p] = row, True
             return derivatives
         for p, some in enumerate(self.terms):
             for k, term in enumerate(some):
