@@ -4,8 +4,8 @@
 import inspect
 import math
 from dataclasses import replace
-from itertools import pairwise
 from functools import partial
+from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
@@ -360,22 +360,27 @@ def test_linear_numbers_need_one_scene():
     assert found * [2e8, 0.02] == pytest.approx(2 * [by[0] * 4e6], rel=1e-9)
 
 
-def row(kind, *numbers, modulus=1.0):
-    """Beams in a row, with a number of the section of each."""
+def row(kind, *numbers, modulus=1.0, force=0.0):
+    """Beams in a row, with a number of the section of each, under a force at the end."""
     sections = [
         ub.Section(**{"EA": 2e9, "GA": 7e8, "EI": 4e6, "rhoA": 60.0, "rhoI": 0.1} | {kind: x})
         for x in (numbers if kind != "EI" else [modulus / x for x in numbers])
     ]
     beams = [ub.Beam((k, 0), (k + 1, 0), s, cells=1) for k, s in enumerate(sections)]
     joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
-    fixed = [ub.Clamped(beams[0].start)]
-    return ub.Scene(beams, joints=joints, supports=fixed, loads=[ub.Gravity()])
+    loads = [ub.Gravity(), ub.PointLoad(beams[-1].end, force=(force, 0), amplitude=math.cos)]
+    return ub.Scene(beams, joints=joints, supports=[ub.Clamped(beams[0].start)], loads=loads)
 
 
 @pytest.mark.parametrize(
     ("kind", "value", "more", "scenes"),
     [
-        ("EA", 2e9, {}, 1 + 2 + (1 + 4)),  # each number depends on one parameter, linearly
+        (
+            "EA",
+            2e9,
+            {"force": 0.0},
+            1 + 2 + (1 + 4),
+        ),  # numbers of one parameter, linear
         ("EI", 1 / 4e6, {}, 1 + 2 + (4 + 4)),  # not linearly
         ("rhoI", 0.1, {}, 1 + 2 + 2 + 2 * (1 + 3)),  # masses of nodes depend on two neighbours
         ("EI", 1 / 4e6, {"modulus": 1.0}, 1 + 2 + 2 * 2 + 4 * 13),  # on one, and on the modulus
@@ -384,11 +389,12 @@ def row(kind, *numbers, modulus=1.0):
 def test_many_parameters_change_in_few_scenes(kind, value, more, scenes):
     """Derivatives by each parameter are those by this parameter alone."""
 
-    def model(modulus=1.0, **values):
-        known = {f"x{k}": value * (1 + k / 20) for k in range(12)} | values
-        return row(kind, *known.values(), modulus=modulus)
+    numbers = {f"x{k}": value * (1 + k / 20) for k in range(12)}
 
-    at = {f"x{k}": value * (1 + k / 20) for k in range(12)} | more
+    def model(modulus=1.0, force=0.0, **values):
+        return row(kind, *(numbers | values).values(), modulus=modulus, force=force)
+
+    at = numbers | more
     _, found, number = counted_gradient(model, at)
     assert number == scenes
     for k, name in [*enumerate(at)][::3]:
@@ -399,12 +405,12 @@ def test_many_parameters_change_in_few_scenes(kind, value, more, scenes):
 def test_functions_of_time_may_depend_on_parameters():
     """An amplitude that is linear in its parameter, and one that is not; against differences."""
 
-    def pushed(slope=2.0, rate=3.0):
+    def pushed(slope=2.0, rate=3.0, size=1e4):
         def amplitude(t):
             return slope * t * math.exp(-rate * t)
 
         scene = strip(**STRIP)
-        push = ub.PointLoad(scene.beams[1].end, force=(0, 1e4), amplitude=amplitude)
+        push = ub.PointLoad(scene.beams[1].end, force=(0, size), amplitude=amplitude)
         return replace(scene, loads=[push])
 
     at = parameters(pushed)

@@ -79,6 +79,8 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
 
+CENTRAL = dict(zip(*next(iter(STENCILS.items())), strict=True))
+
 TOGETHER = 1.0, 1.5
 """Least and largest step of a parameter in the scenes where all parameters change, as a multiple
 of the step of :data:`MODEL_STEP`."""
@@ -370,7 +372,7 @@ class Case:
             if not all(map(numbers.moves_alike, both)):  # C needs the terms of all scenes
                 one_each = [[beside(1, every[p : p + 1])] for p in every if linear]
                 return Beside(one_each, 1 / far[:, None]) if linear else None
-            stencil = {1: 1.0} if linear else dict(zip(*[*STENCILS.items()][0], strict=True))
+            stencil = {1: 1.0} if linear else CENTRAL
             for n in (1, 2, len(every)) if len(every) > FEW else (len(every),):
                 rows = list[dict[int, Array]]()
                 for some in (every[k::n] for k in range(n)):

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import starmap
 from types import SimpleNamespace
 from typing import Any
 
@@ -198,8 +199,9 @@ class Numbers:
         of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
         for here, *others in of_three:
             if not all(same_function(here, other) for other in others):
-                at, *ends = np.array([[f(float(t)) for t in self._times] for f in (here, *others)])
-                if not _cancel(*(x - at for x in ends), at):
+                three = [[f(float(t)) for t in self._times] for f in (here, *others)]
+                at, before, after = np.array(three)
+                if not _cancel(before - at, after - at, at):
                     return False
         return True
 
@@ -207,12 +209,9 @@ class Numbers:
         return [function for _, function in of.scene.time_functions()]
 
     def moves_alike(self, other: Any) -> bool:
-        """Return whether all functions of time and dead loads are the same in a scene."""
-        if not alike(self._run, other):
-            return False
-        same = all(map(same_function, self._functions(self._run), self._functions(other)))
-        terms = zip(self._run.equation.terms, other.equation.terms, strict=True)
-        return same and not any(here.differs(there) for here, there in terms)
+        """Return whether all functions of time are the same in a scene."""
+        both = map(self._functions, (self._run, other))
+        return alike(self._run, other) and all(starmap(same_function, zip(*both, strict=True)))
 
 
 def _of_term(i: int, values: Callable[[Any], Array], scene: Any) -> Array:

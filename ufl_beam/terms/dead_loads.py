@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -95,28 +96,40 @@ class DeadLoads(LoadTerm):
         )  # fmt: skip
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
+    @property
+    def parts(self) -> object:
+        """See the base class: the number of functions of time."""
+        return type(self), len(self._vectors)
+
     def derivatives(self, neighbours: Neighbours) -> list[Each] | None:
         """See the base class."""
-        parameters, number = len(neighbours), neighbours.number
-        now, end = np.zeros((2, parameters, self._size))
+        P, number = len(neighbours), len(self._vectors)
+        now, end = np.zeros((2, P, self._size))
         before = neighbours.state(lambda term: term._whole(term._forces[1]))
+        changes = [
+            (p, v, change.copy())
+            for v in range(number)
+            for p, change in enumerate(neighbours.differences(partial(_vector, v)))
+            if change.any()
+        ]
+        parameter, vector = (np.array([x[k] for x in changes], dtype=np.int32) for k in (0, 1))
+        rows = np.reshape([x[2] for x in changes], (-1, self._size))
+        dofs = np.flatnonzero(rows.any(axis=0)).astype(np.int32)
         loads = ffi.new("dead_loads *[]", [x._c for some in neighbours.terms for x in some])
-        changes = np.array(
-            [any(map(self.differs, some)) for some in neighbours.terms], dtype=np.int32
-        )
+        enters = np.zeros(P, dtype=np.int32)
+        enters[parameter] = 1
+        for p, some in enumerate(neighbours.terms):
+            pairs = (x for term in some for x in zip(self._in_time, term._in_time, strict=True))
+            enters[p] |= not all(same_function(a, b) for (a, _), (b, _) in pairs)
         c = struct(
-            "load_derivatives", parameters=parameters, size=self._size, neighbours=number,
-            loads=self._c, own=np.zeros(self._size), neighbour=loads, weight=neighbours.weights,
-            now=now, end=end, before=before, changes=changes,
+            "load_derivatives", parameters=P, size=self._size, neighbours=neighbours.number,
+            loads=self._c, number=len(rows), loaded=len(dofs), parameter=parameter, vector=vector,
+            dof=dofs, change=rows.take(dofs, axis=1), factor=np.zeros(number),
+            by_factor=np.zeros((P, number)), neighbour=loads, weight=neighbours.weights,
+            now=now, end=end, before=before, enters=enters,
+            vector_bar=np.zeros((number, len(dofs))),
         )  # fmt: skip
         return [in_c("load", c)]
-
-    def differs(self, term: DeadLoads) -> bool:
-        """Return whether the loads of another scene may differ."""
-        same = np.array_equal(self.dofs, term.dofs)
-        same = same and np.array_equal(self._vectors, term._vectors)
-        pairs = zip(self._in_time, term._in_time, strict=True)
-        return not (same and all(same_function(a, b) for (a, _), (b, _) in pairs))
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""
@@ -137,6 +150,11 @@ class DeadLoads(LoadTerm):
         for k, factor in enumerate(self._factors[2]):
             self._c.asked[k] = math.nan
             self._factors[2, k] = archive.number(f"part of dead loads {k}", factor)
+
+
+def _vector(v: int, term: DeadLoads) -> Array:
+    """Return the forces of loads with the same function of time, at its value 1."""
+    return term._whole(term._vectors[v])
 
 
 def add_dead_load(load: Load, subdomain: Subdomain, forces: Array) -> tuple[Index, Array] | None:

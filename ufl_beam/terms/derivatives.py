@@ -254,7 +254,7 @@ def functions(kind: str) -> list[Any]:
 TRANSPOSES = {
     "block": ("transpose_block_state", "transpose_block", "finish_block"),
     "product": ("", "transpose_product", ""),
-    "load": ("", "transpose_loads", ""),
+    "load": ("", "transpose_loads", "finish_loads"),
     "differences": ("", "transpose_differences", ""),
 }
 """Functions of ``term_transposes`` of loops.h by the kind of a derivative."""

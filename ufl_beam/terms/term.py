@@ -144,10 +144,6 @@ class Term(ABC):
         """Return whether a term of another scene differs in numbers and functions only."""
         return True
 
-    def differs(self, term: Any) -> bool:
-        """Return whether a term of another scene differs beyond numbers of :meth:`derivatives`."""
-        return False
-
     def start(self, q: Array) -> None:
         """Set the accepted configuration to ``q``, without a step."""
 

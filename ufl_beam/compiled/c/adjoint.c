@@ -69,9 +69,22 @@ static void transpose_rates(adjoint *a, const time_loop *m, int initial)
 void transpose_loads(void *self, adjoint *a, const double *λ)
 {
   const load_derivatives *l = self;
-  differentiate_loads(self, a->step, 0);
-  for (int p = 0; p < a->parameters; ++p)
-    if (l->changes[p]) a->gradient[p] -= dot(l->size, l->now + (size_t)p * l->size, λ);
+  const dead_loads *loads = l->loads;
+  find_factors(l, a->step);
+  for (int v = 0; v < loads->vectors; ++v) {
+    double work = 0;
+    for (int i = 0; i < l->loaded; ++i) l->vector_bar[(size_t)v * l->loaded + i] -= l->factor[v] * λ[l->dof[i]];
+    for (int i = 0; l->neighbours && i < loads->size; ++i) work += loads->vector[v][i] * λ[loads->dof[i]];
+    for (int p = 0; l->neighbours && p < l->parameters; ++p) a->gradient[p] -= l->by_factor[p * loads->vectors + v] * work;
+  }
+}
+
+void finish_loads(void *self, adjoint *a)
+{
+  const load_derivatives *l = self;
+  for (int c = 0; c < l->number; ++c)
+    a->gradient[l->parameter[c]] +=
+      dot(l->loaded, l->vector_bar + (size_t)l->vector[c] * l->loaded, l->change + (size_t)c * l->loaded);
 }
 
 /* Terms of loads by differences between scenes; only their explicit derivatives are differenced. */

@@ -78,40 +78,41 @@ static void advance_rates(const derivatives *d, const time_loop *m, const step_p
 
 /* -- loads and prescribed motions ---------------------------------------------------------------------- */
 
-/* Dead loads at a time. */
-static void find_loads_at(const dead_loads *one, double t, int size, double *out)
+/* Factors of the dead loads at the time of a step, and their derivatives. */
+static void find_factors(const load_derivatives *l, const time_step *step)
 {
-  memset(out, 0, size * sizeof *out);
-  for (int j = 0; j < one->vectors; ++j) {
-    const double factor = value_at(one->factor + j, t);
-    for (int i = 0; i < one->size; ++i) out[one->dof[i]] += factor * one->vector[j][i];
-  }
+  const int n = l->loads->vectors;
+  memset(l->by_factor, 0, (size_t)l->parameters * n * sizeof *l->by_factor);
+  for (int v = 0; v < n; ++v) l->factor[v] = value_at(l->loads->factor + v, step->load_time);
+  for (int k = 0; k < l->parameters * l->neighbours; ++k)
+    for (int v = 0; v < n; ++v)
+      l->by_factor[k / l->neighbours * n + v] +=
+        l->weight[k] * (value_at(l->neighbour[k]->factor + v, step->load_time) - l->factor[v]);
 }
 
 void differentiate_loads(void *self, const time_step *step, const double *q1)
 {
   const load_derivatives *l = self;
-  find_loads_at(l->loads, step->load_time, l->size, l->own);
-  for (int p = 0; p < l->parameters; ++p) {
-    double *end = l->end + (size_t)p * l->size, *now = l->now + (size_t)p * l->size;
-    const double *before = l->before + (size_t)p * l->size;
-    if (!l->changes[p]) continue;
-    memset(end, 0, l->size * sizeof *end);
-    for (int k = 0; k < l->neighbours; ++k) {
-      find_loads_at(l->neighbour[p * l->neighbours + k], step->load_time, l->size, now);
-      for (int i = 0; i < l->size; ++i) end[i] += l->weight[p * l->neighbours + k] * (now[i] - l->own[i]);
+  const dead_loads *loads = l->loads;
+  find_factors(l, step);
+  memset(l->end, 0, (size_t)l->parameters * l->size * sizeof *l->end);
+  for (int k = 0; k < l->parameters * loads->vectors; ++k)
+    for (int i = 0; l->by_factor[k] != 0 && i < loads->size; ++i)
+      l->end[(size_t)(k / loads->vectors) * l->size + loads->dof[i]] += l->by_factor[k] * loads->vector[k % loads->vectors][i];
+  for (int c = 0; c < l->number; ++c)
+    for (int i = 0; i < l->loaded; ++i)
+      l->end[(size_t)l->parameter[c] * l->size + l->dof[i]] += l->factor[l->vector[c]] * l->change[(size_t)c * l->loaded + i];
+  for (int p = 0; p < l->parameters; ++p)
+    for (size_t i = (size_t)p * l->size; l->enters[p] && i < (size_t)(p + 1) * l->size; ++i) {
+      l->end[i] = l->before[i] + step->fraction * (l->end[i] - l->before[i]);
+      l->now[i] = l->before[i] + step->at * (l->end[i] - l->before[i]);
     }
-    for (int i = 0; i < l->size; ++i) {
-      end[i] = before[i] + step->fraction * (end[i] - before[i]);
-      now[i] = before[i] + step->at * (end[i] - before[i]);
-    }
-  }
 }
 
 void add_load_derivative(void *self, const derivatives *d, int p, double *r)
 {
   const load_derivatives *l = self;
-  for (int i = 0; l->changes[p] && i < l->size; ++i) r[i] -= l->now[(size_t)p * l->size + i];
+  for (int i = 0; l->enters[p] && i < l->size; ++i) r[i] -= l->now[(size_t)p * l->size + i];
 }
 
 void accept_load_derivative(void *self, const derivatives *d)

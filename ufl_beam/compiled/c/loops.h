@@ -980,14 +980,18 @@ struct block_derivatives {
   int shifts;
 };
 
-/* Derivatives of dead loads, from the loads of scenes with other values of a parameter. */
+/* Derivatives of dead loads: of their vectors, and of their factors from scenes with other values of a
+ * parameter. */
 typedef struct {
-  int parameters, size, neighbours;
+  int parameters, size, neighbours, number, loaded;
   const dead_loads *loads, *const *neighbour;
   const double *weight;
-  const int32_t *changes;     /* whether a parameter changes the loads */
-  double *own;                /* the loads at the end of this step */
+  const int32_t *parameter, *vector, *dof;
+  const double *change;       /* `number` derivatives of a vector by a parameter, at the `loaded` degrees of freedom */
+  const int32_t *enters;      /* whether a parameter changes the loads */
+  double *factor, *by_factor; /* factors, and their derivatives; parameters x vectors */
   double *now, *end, *before; /* in the equation, at the end of this step, at the end of the last step */
+  double *vector_bar;         /* of the adjoint; vectors x loaded */
 } load_derivatives;
 
 /* A term in the steps of a run. */
@@ -1038,6 +1042,7 @@ void transpose_points_state(const point_derivatives *m, adjoint *a);
 void transpose_points(const point_derivatives *m, adjoint *a);
 void transpose_product(void *self, adjoint *a, const double *lambda);
 void transpose_loads(void *self, adjoint *a, const double *lambda);
+void finish_loads(void *self, adjoint *a);
 void transpose_differences(void *self, adjoint *a, const double *lambda);
 void transpose_block_state(void *self, adjoint *a);
 void transpose_block(void *self, adjoint *a, const double *lambda);
