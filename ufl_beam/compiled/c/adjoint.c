@@ -112,8 +112,6 @@ int record_step(adjoint *a, time_loop *m, int initial)
   restart(e, EXACT);
   residual(e, e->unknowns, e->residual, e->f);
   fill_tangent(e, m->x);
-  for (int k = 0; k < d->terms; ++k)
-    if (d->term[k].linearize) d->term[k].linearize(d->term[k].self, &m->step, m->x);
   char *to = a->record + (size_t)a->recorded * a->bytes;
   memcpy(to, &initial, sizeof initial), to += sizeof initial;
   memcpy(to, &m->step, sizeof m->step), to += sizeof m->step;
