@@ -340,7 +340,7 @@ def counted_gradient(model, at):
 
 
 def test_linear_numbers_need_one_scene():
-    """Two scenes have changes of all parameters; then one by parameter is enough, or four are."""
+    """Two scenes have changes of all parameters; then one to four by parameter are enough."""
     value, by, scenes = counted_gradient(strip, STRIP)
     assert scenes == 1 + 2 + 3
     assert value == pytest.approx(sway(ub.simulate(strip(**STRIP), EXACT, **SHORT))[-1], rel=1e-12)
@@ -349,14 +349,14 @@ def test_linear_numbers_need_one_scene():
         return strip(1 / weak, **more)
 
     _, found, scenes = counted_gradient(softened, STRIP | {"weak": 1 / 4e6})
-    assert scenes == 1 + 2 + 4 * 3
+    assert scenes == 1 + 2 + 4 + 2 * 2
     assert found == pytest.approx(by * [-(4e6**2), 1.0, 1.0], rel=1e-9)
 
     def product(modulus, inertia):  # linear in each parameter alone
         return strip(modulus * inertia, 8e6, 1e4)
 
     _, found, scenes = counted_gradient(product, {"modulus": 2e8, "inertia": 0.02})
-    assert scenes == 1 + 2 + 4 * 2
+    assert scenes == 1 + 2 + 2 * 2
     assert found * [2e8, 0.02] == pytest.approx(2 * [by[0] * 4e6], rel=1e-9)
 
 
@@ -375,20 +375,14 @@ def row(kind, *numbers, modulus=1.0, force=0.0):
 @pytest.mark.parametrize(
     ("kind", "value", "more", "scenes"),
     [
-        (
-            "EA",
-            2e9,
-            {"force": 0.0},
-            1 + 2 + (1 + 4),
-        ),  # numbers of one parameter, linear
-        ("EI", 1 / 4e6, {}, 1 + 2 + (4 + 4)),  # not linearly
-        ("rhoI", 0.1, {}, 1 + 2 + 2 + 2 * (1 + 3)),  # masses of nodes depend on two neighbours
-        ("EI", 1 / 4e6, {"modulus": 1.0}, 1 + 2 + 2 * 2 + 4 * 13),  # on one, and on the modulus
+        ("EA", 2e9, {"force": 0.0}, 1 + 2 + 4),  # each number depends on one, linearly
+        ("EI", 1 / 4e6, {}, 1 + 2 + 4 + 2),  # not linearly
+        ("rhoI", 0.1, {}, 1 + 2 + 1 + 2 * (1 + 3)),  # masses of nodes depend on two neighbours
+        ("EI", 1 / 4e6, {"modulus": 1.0}, 1 + 2 + 1 + 2 + 4 * 12 + 2),  # and on modulus
     ],
 )
 def test_many_parameters_change_in_few_scenes(kind, value, more, scenes):
     """Derivatives by each parameter are those by this parameter alone."""
-
     numbers = {f"x{k}": value * (1 + k / 20) for k in range(12)}
 
     def model(modulus=1.0, force=0.0, **values):

@@ -20,7 +20,7 @@ from mpi4py import MPI
 import numpy as np
 import numpy.typing as npt
 
-from ufl_beam.analysis.neighbouring_scenes import Beside, NeighbouringScene, Numbers, alike
+from ufl_beam.analysis.neighbouring_scenes import Beside, NeighbouringScene, Numbers, Unlike, alike
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
 from ufl_beam.discretization.cells_in_space import TURNS, turned_further
@@ -78,8 +78,6 @@ STENCILS: dict[tuple[int, ...], tuple[float, ...]] = {
 }
 """Positions and weights of five-point differences: central ones, and one-sided ones at the end of
 the range of a parameter.  The weight of the position 0 makes the sum of the weights zero."""
-
-CENTRAL = dict(zip(*next(iter(STENCILS.items())), strict=True))
 
 TOGETHER = 1.0, 1.5
 """Least and largest step of a parameter in the scenes where all parameters change, as a multiple
@@ -358,32 +356,33 @@ class Case:
         every, values = np.arange(len(self.at)), np.array([*self.at.values()])
         steps = np.array([self._step(name, MODEL_STEP) for name in self.at])
         far = np.random.default_rng(0).uniform(*TOGETHER, len(steps)) * steps
-        numbers = Numbers(run, t1)
+        numbers, both = Numbers(run, t1), dict[int, NeighbouringScene]()
 
-        def beside(k: float, some: Index) -> NeighbouringScene:
+        def beside(k: int, some: Index) -> NeighbouringScene:
+            if len(some) == len(every) and k in both:
+                return both[k]
             changed = values.copy()
             changed[some] += k * far[some]
             scene = self.scene(dict(zip(self.at, map(float, changed), strict=True)))
             return NeighbouringScene(run, scene)
 
         try:
-            both = [beside(k, every) for k in (-1, 1)]
-            linear = numbers.are_linear(both)
-            if not all(map(numbers.moves_alike, both)):  # C needs the terms of all scenes
+            both |= {k: beside(k, every) for k in (-1, 1)}
+            linear = numbers.are_linear([*both.values()])
+            if not all(map(numbers.moves_alike, both.values())):  # C needs the terms of all scenes
                 one_each = [[beside(1, every[p : p + 1])] for p in every if linear]
                 return Beside(one_each, 1 / far[:, None]) if linear else None
-            stencil = {1: 1.0} if linear else CENTRAL
             for n in (1, 2, len(every)) if len(every) > FEW else (len(every),):
                 rows = list[dict[int, Array]]()
                 for some in (every[k::n] for k in range(n)):
-                    if (found := numbers.derivatives(beside, far, some, stencil)) is None:
+                    if (found := numbers.derivatives(beside, far, some, linear=linear)) is None:
                         break
                     rows = [x | y for x, y in zip(rows, found, strict=True)] if rows else found
                 else:
                     both[1].forget()
-                    return Beside([both[1:]] * len(every), 1 / steps[:, None], rows)
-        except ArgumentError:
-            return None
+                    return Beside([[both[1]]] * len(every), 1 / steps[:, None], rows)
+        except (ArgumentError, Unlike):
+            pass
         return None
 
 

@@ -76,8 +76,8 @@ def gradient(
     """Compute one number of a run, and differentiate it by many parameters of the scene.
 
     The adjoint of the run goes back through its steps once, at a cost that hardly depends on the
-    number of parameters.  Besides, the model is called once for each parameter if all numbers of
-    the scene are linear functions of the parameters, as a stiffness is of EI, else four times.
+    number of parameters.  Besides, the model is called for differences of the numbers of the scene,
+    seldom if each number depends on one parameter at most, as a stiffness does on EI.
     :func:`differentiate` has derivatives of any quantity, and continues a preload with ``start``,
     which this function does not: its run begins with the undeformed scene.
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import starmap
@@ -113,6 +113,10 @@ def alike(run: Simulation, other: Any) -> bool:
     return terms[0] == terms[1] and angles[0] == angles[1] and constrained
 
 
+class Unlike(Exception):
+    """Terms of a neighbouring scene differ in more than numbers and functions of time."""
+
+
 class Numbers:
     """Numbers in the terms of a run that parameters may change."""
 
@@ -134,16 +138,15 @@ class Numbers:
         self._others = bool(run.scene.works) or any(isinstance(x, ForceLaw) for x in laws)
         self._others |= any(isinstance(x, MovingLoad) for x in run.scene.loads)
 
-    def changes(self, other: Any) -> list[Array] | None:
-        """Return the changes of all numbers in a scene; None if its terms differ in more."""
+    def changes(self, other: Any) -> list[Array]:
+        """Return the changes of all numbers in a scene; raise if its terms differ in more."""
         if self._others or not alike(self._run, other):
-            return None
-        terms = [*zip(self._run.equation.terms, other.equation.terms, strict=True)]
-        if not all(here.is_like(there) for here, there in terms):
-            return None
-        for i, fixed in self._fixed:
-            if not np.array_equal(fixed(terms[i][0]), fixed(terms[i][1])):
-                return None
+            raise Unlike
+        terms = self._run.equation.terms, other.equation.terms
+        fixed = ([of(some[i]) for i, of in self._fixed] for some in terms)
+        same = all(here.is_like(there) for here, there in zip(*terms, strict=True))
+        if not (same and all(map(np.array_equal, *fixed))):
+            raise Unlike
         found = list[Array]()
         for here, values in zip(self._here, self._values, strict=True):
             with np.errstate(invalid="ignore"):  # infinite numbers do not change
@@ -152,9 +155,8 @@ class Numbers:
         return found
 
     def derivatives(
-        self, beside: Callable[[float, Index], Any], far: Array, some: Index,
-        stencil: Mapping[int, float],
-    ) -> list[dict[int, Array]] | None:  # fmt: skip
+        self, beside: Callable[[int, Index], Any], far: Array, some: Index, *, linear: bool
+    ) -> list[dict[int, Array]] | None:
         """Return the rows of :class:`Beside` by some parameters, from scenes in which all change.
 
         They are None if a number depends on two of the parameters.  A scene for each bit of their
@@ -166,23 +168,23 @@ class Numbers:
                 ``far``.
             far: Changes of all parameters; (P,).
             some: Indices of the parameters.
-            stencil: Weights of the multiples in the derivatives.
+            linear: Whether all numbers are linear functions of the parameters.
         """
-        if (whole := self.changes(beside(1, some))) is None:
-            return None
-        places, order = [np.zeros(x.shape, dtype=np.intp) for x in whole], np.arange(len(some))
+        whole, order = self.changes(beside(1, some)), np.arange(len(some))
+        places = [np.zeros(x.shape, dtype=np.intp) for x in whole]
         for bit in range(int(order[-1]).bit_length()):
-            if (part := self.changes(beside(1, some[order >> bit & 1 == 1]))) is None:
-                return None
+            part = self.changes(beside(1, some[order >> bit & 1 == 1]))
             for place, x, y in zip(places, whole, part, strict=True):
                 if y[y != x].any():
                     return None
                 place[y != 0] |= 1 << bit
-        slopes = [stencil[1] * x for x in whole]
-        for k in {*stencil} - {1}:
-            if (more := self.changes(beside(k, some))) is None:
-                return None
-            slopes = [slope + stencil[k] * x for slope, x in zip(slopes, more, strict=True)]
+        slopes = whole
+        if not linear:
+            low = self.changes(beside(-1, some))
+            if not all(map(_cancel, low, whole, self._here)):  # five-point differences
+                ends = (self.changes(beside(k, some)) for k in (-2, 2))
+                four = zip(*ends, low, whole, strict=True)
+                slopes = [(a - b + 8 * (d - c)) / 12 for a, b, c, d in four]
         return [
             {
                 int(some[k]): np.where(place == k, slope, 0.0) / far[some[k]]
@@ -193,8 +195,7 @@ class Numbers:
 
     def are_linear(self, both: Sequence[Any]) -> bool:
         """Return whether changes of numbers and functions in two opposite scenes cancel."""
-        low, high = map(self.changes, both)
-        if low is None or high is None or not all(map(_cancel, low, high, self._here)):
+        if not all(map(_cancel, *map(self.changes, both), self._here)):
             return False
         of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
         for here, *others in of_three:
