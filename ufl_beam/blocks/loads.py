@@ -13,13 +13,21 @@ import ufl
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import StatementOnCell, places, positions
 from ufl_beam.blocks.moving_loads import moving_loads
+from ufl_beam.blocks.nodes_in_space import StatementInSpace
+from ufl_beam.blocks.spatial_loads import (
+    LoadOnNode,
+    LoadsInSpace,
+    PressureInSpace,
+    rotations_in_space,
+)
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.discretization.cell_functions import Cell
-from ufl_beam.discretization.function_spaces import point_masses
+from ufl_beam.discretization.cells_in_space import cell_axes
+from ufl_beam.discretization.function_spaces import Fields, point_masses
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.model.functions import steady
-from ufl_beam.model.loads import FollowerLoad, MovingLoad, Pressure, RotatingFrame
+from ufl_beam.model.loads import FollowerLoad, MovingLoad, PointLoad, Pressure, RotatingFrame
 from ufl_beam.terms.dead_loads import loaded_cells
 
 
@@ -114,30 +122,39 @@ class ForceOfRotation(StatementOnCell):
 
 def load_blocks(setting: BlockSetting) -> list[Block]:
     """Return the blocks of the loads of a scene; every process has them."""
-    loads, blocks = setting.subdomain.numbering.scene.loads, list[Block]()
+    scene, blocks = setting.scene, list[Block]()
     made: Any
     for kind, made in (
-        (FollowerLoad, _followers), (Pressure, _pressures), (RotatingFrame, _rotations),
+        (PointLoad, _at_nodes), (FollowerLoad, _at_nodes), (Pressure, _pressures),
+        (RotatingFrame, rotations_in_space if scene.in_space else _rotations),
         (MovingLoad, moving_loads),
     ):  # fmt: skip
-        some = [load for load in loads if isinstance(load, kind)]
+        some: list[Any] = [load for load in scene.loads if isinstance(load, kind)]
+        if kind is PointLoad:  # forces and, in the plane, moments are no statement
+            some = [load for load in some if scene.in_space and np.any(load.moment)]
         for statement, elements in made(some, setting) if some else ():
-            blocks.append(Block(statement, elements, setting, supplies="loads"))
+            of = LoadsInSpace if isinstance(statement, StatementInSpace) else Block
+            blocks.append(of(statement, elements, setting, supplies="loads"))
     return blocks
 
 
-def _followers(
-    loads: Sequence[FollowerLoad], setting: BlockSetting
+def _at_nodes(
+    loads: Sequence[PointLoad | FollowerLoad], setting: BlockSetting
 ) -> Iterator[tuple[Statement, Elements]]:
-    subdomain = setting.subdomain
+    subdomain, scheme, follows = setting.subdomain, setting.scheme, not loads[0].dead
     mine = np.array([i for i, x in enumerate(loads) if subdomain.computes(x.place)], dtype=int)
     nodes = [subdomain.local(subdomain.numbering.node(loads[i].place)) for i in mine]
-    forces = np.array([[*loads[i].force, loads[i].moment] for i in mine]).reshape(-1, 3)
+    d = 3 if setting.scene.in_space else 2
+    rows = [(*(*x.force, 0.0)[:d], *np.broadcast_to(x.moment, 2 * d - 3)) for x in loads]
+    forces = np.array(rows, float)[mine, 0 if follows else d :]
     in_time = [InTime(load.amplitude, load) for load in loads]
     yield (
-        FollowerForce(setting.scheme.load_weight),
-        Elements("follower loads", mine, np.array(nodes), [*forces.T], in_time, {"factor": mine}),
-    )
+        LoadOnNode(scheme, follows) if d == 3 else FollowerForce(scheme.load_weight),
+        Elements(
+            "follower loads" if follows else "dead moments", mine, np.array(nodes), forces.T,
+            in_time, {"factor": mine},
+        ),
+    )  # fmt: skip
 
 
 def _pressures(
@@ -145,15 +162,23 @@ def _pressures(
 ) -> Iterator[tuple[Statement, Elements]]:
     subdomain, numbering = setting.subdomain, setting.subdomain.numbering
     pairs = [loaded_cells(load, subdomain) for load in loads]
-    cells = np.concatenate([cells for cells, _ in pairs])
+    cells, shares = map(np.concatenate, zip(*pairs, strict=True))
     of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
-    forces = np.array([[load.normal, load.tangential] for load in loads])[of_load]
-    shares = np.concatenate([shares for _, shares in pairs])
     indices = subdomain.cells[cells] + len(numbering.cells) * of_load
     in_time = [InTime(load.amplitude, load) for load in loads]
-    yield PressureOnCell(numbering.mesh.degree, setting.scheme.load_weight), Elements(
-        "pressures", indices, subdomain.cell_dofs[cells],
-        [*forces.T, *positions(subdomain, cells), *shares.T], in_time, {"factor": of_load}, cells,
+    statement: Statement
+    if in_space := setting.scene.in_space:
+        lengths, axes = cell_axes(Fields(subdomain, cells))
+        at = [lengths, *axes.transpose(2, 1, 0).reshape(9, -1)]
+        statement = PressureInSpace(setting.scheme)
+    else:
+        at = [*positions(subdomain, cells)]
+        statement = PressureOnCell(numbering.mesh.degree, setting.scheme.load_weight)
+    normals = (np.broadcast_to(x.normal, 1 + in_space) for x in loads)
+    forces = np.array([[*p, x.tangential] for p, x in zip(normals, loads, strict=True)])[of_load]
+    yield statement, Elements(
+        "pressures", indices, subdomain.cell_dofs[cells], [*forces.T, *at, *shares.T], in_time,
+        {"factor": of_load}, None if in_space else cells,
     )  # fmt: skip
 
 

@@ -12,7 +12,6 @@ import ufl
 
 from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
 from ufl_beam.blocks.cells import StatementOnCell
-from ufl_beam.blocks.moving_loads import moving_loads
 from ufl_beam.blocks.nodes_in_space import (
     FIRST,
     StatementInSpace,
@@ -39,16 +38,8 @@ from ufl_beam.mechanics.spatial_kinematics import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end, has_inertia
 from ufl_beam.model.functions import steady
-from ufl_beam.model.loads import (
-    FollowerLoad,
-    LoadAtPlace,
-    MovingLoad,
-    PointLoad,
-    Pressure,
-    RotatingFrame,
-)
+from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.quadrature import gauss_rule
-from ufl_beam.terms.dead_loads import loaded_cells
 
 NO_FORCE = [ufl.as_ufl(0.0)] * 3
 RATE = "rate x", "rate y", "rate z"
@@ -71,15 +62,15 @@ class LoadOnNode(StatementInSpace):
 
     @property
     def numbers(self) -> list[str]:
-        """Moment, and force of a load that follows, in the undeformed scene."""
-        return [f"{x}{i}" for x in "MF"[: 1 + self.follows] for i in range(3)]
+        """Force of a load that follows, and moment, in the undeformed scene."""
+        return [f"{x}{i}" for x in "FM"[not self.follows :] for i in range(3)]
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class."""
         turn = turn_in_step(at, 0, self.scheme)
-        M, *F = (
+        *F, M = (
             scale(at["factor"], tuple(at[f"{x}{i}"] for i in range(3)))
-            for x in "MF"[: 1 + self.follows]
+            for x in "FM"[not self.follows :]
         )
         forces: Sequence[Any] = NO_FORCE
         if self.follows:
@@ -100,7 +91,7 @@ class PressureInSpace(StatementInSpace):
     def numbers(self) -> list[str]:
         """Forces along the axes of the section for a factor of 1, length, axes, and shares."""
         axes = [f"R{i}{j}" for i in range(3) for j in range(3)]
-        return ["p1", "p2", "p3", "h", *axes, *(f"share{g}" for g in range(4))]
+        return ["p2", "p3", "p1", "h", *axes, *(f"share{g}" for g in range(4))]
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class; the derivative of the axis has the length of its part of the cell."""
@@ -205,66 +196,10 @@ class LoadsInSpace(Block):
         fill(self._c, turns=acts_at_end(statement.scheme))
 
 
-def loads_in_space(setting: BlockSetting) -> list[Block]:
-    """Return the blocks of the loads of a scene in space, besides dead forces."""
-    loads = setting.scene.loads
-    moments = [x for x in loads if isinstance(x, PointLoad) and np.any(x.moment)]
-    moving = [x for x in loads if isinstance(x, MovingLoad)]
-    followers = [x for x in loads if isinstance(x, FollowerLoad)]
-    made = [
-        *_at_nodes("dead moments", moments, setting),
-        *_at_nodes("follower loads", followers, setting),
-        *_pressures([x for x in loads if isinstance(x, Pressure)], setting),
-        *_rotations([x for x in loads if isinstance(x, RotatingFrame)], setting),
-        *(moving_loads(moving, setting) if moving else ()),
-    ]  # fmt: skip
-    return [
-        (LoadsInSpace if isinstance(statement, StatementInSpace) else Block)(
-            statement, elements, setting, supplies="loads"
-        )
-        for statement, elements in made
-    ]
-
-
-def _at_nodes(
-    name: str, loads: Sequence[LoadAtPlace], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
-    if loads:
-        subdomain, mine, follows = setting.subdomain, np.arange(len(loads)), name != "dead moments"
-        nodes = np.array([subdomain.local(subdomain.numbering.node(x.place)) for x in loads])
-        numbers = [
-            [*np.broadcast_to(x.moment, 3), *((*x.force, 0.0)[:3] if follows else ())]
-            for x in loads
-        ]
-        in_time = [InTime(load.amplitude, load) for load in loads]
-        yield LoadOnNode(setting.scheme, follows), Elements(
-            name, mine, nodes, np.array(numbers, float).T, in_time, {"factor": mine}
-        )  # fmt: skip
-
-
-def _pressures(
-    loads: Sequence[Pressure], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
-    if loads:
-        subdomain = setting.subdomain
-        pairs = [loaded_cells(load, subdomain) for load in loads]
-        cells = np.concatenate([cells for cells, _ in pairs])
-        of_load = np.repeat(np.arange(len(loads)), [len(cells) for cells, _ in pairs])
-        forces = np.array([[x.tangential, *np.broadcast_to(x.normal, 2)] for x in loads])[of_load]
-        lengths, axes = cell_axes(Fields(subdomain, cells))
-        shares = np.concatenate([shares for _, shares in pairs])
-        indices = subdomain.cells[cells] + len(subdomain.numbering.cells) * of_load
-        in_time = [InTime(load.amplitude, load) for load in loads]
-        yield PressureInSpace(setting.scheme), Elements(
-            "pressures", indices, subdomain.cell_dofs[cells],
-            [*forces.T, lengths, *axes.transpose(2, 1, 0).reshape(9, -1), *shares.T], in_time,
-            {"factor": of_load},
-        )  # fmt: skip
-
-
-def _rotations(
+def rotations_in_space(
     frames: Sequence[RotatingFrame], setting: BlockSetting
 ) -> Iterator[tuple[Statement, Elements]]:
+    """Yield the statements of a rotating frame and their elements."""
     for frame in frames:  # one at most
         subdomain, in_time = setting.subdomain, [InTime(steady, frame)]
         numbering, scheme, bodies = subdomain.numbering, setting.scheme, setting.scene.bodies

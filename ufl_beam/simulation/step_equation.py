@@ -27,7 +27,6 @@ from ufl_beam.blocks.spatial_beams import (
     bodies_in_space,
     viscosity_in_space,
 )
-from ufl_beam.blocks.spatial_loads import loads_in_space
 from ufl_beam.blocks.works import work_blocks
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
@@ -134,7 +133,6 @@ class StepEquation:
         self.in_space, self.nodes_in_space = list[CellsInSpace](), list[Any]()
         if scene.in_space:
             self.in_space = [CellsInSpace(subset, in_blocks)] if len(subset.order) else []
-            self.loads += loads_in_space(in_blocks)
             bodies = bodies_in_space(in_blocks)
             self.nodes_in_space += [*self.inelastic, *self.in_space, *bodies]
             others += bodies
@@ -142,8 +140,7 @@ class StepEquation:
             self.beams.append(elastic_cells(subset, in_blocks, strains))
             if scheme.lost_fraction:
                 others.append(second_differences(subset, in_blocks))
-        if not scene.in_space:
-            self.loads += load_blocks(in_blocks)
+        self.loads += load_blocks(in_blocks)
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
