@@ -435,7 +435,7 @@ class StepDerivatives:
             self._alive.append(own)
             scene.enters |= own.enters
         self._neighbours = scene
-        in_c = [(data, *functions(kind)) for kind, data in self.terms]
+        in_c = [(data, *functions(kind)[:4]) for kind, data in self.terms]
         constrained = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
         self._change, self._time = np.full(P, np.inf), np.full(P, np.nan)

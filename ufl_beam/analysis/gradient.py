@@ -43,7 +43,7 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_lengths import step_count
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.terms.derivatives import recorded, transposes
+from ufl_beam.terms.derivatives import functions, recorded
 
 SMALL = 2.0**-17
 """Small step of differences of histories and numbers, as a fraction of the largest value."""
@@ -156,7 +156,7 @@ class _Adjoint:
     def __init__(self, simulation: Simulation, steps: StepDerivatives, max_bytes: float) -> None:
         self._simulation, self._steps = simulation, steps
         c, A = steps.c, simulation.equation.A
-        terms = [transposes(kind) for kind, _ in steps.terms]
+        terms = [functions(kind)[4:] for kind, _ in steps.terms]
         blocks = [(A.data, A.data.nbytes)]
         blocks += [block for term in steps.terms for block in recorded(*term)]
         loop, size = simulation.time_loop, simulation.subdomain.size
@@ -267,19 +267,10 @@ class _History:
                 "finite values, and leave out those that reduce does not need"
             )
         self.value = self._number(reference)
-        if self._numbering.scene.in_space:
-            self._require_no_rotations()
-
-    def _require_no_rotations(self) -> None:
-        """Raise if the history depends on rotations in space, which are no sums of unknowns."""
-        columns = [x.columns.column_of(TURNS, x.rows) for x in self._blocks]
-        kept = [column.copy() for column in columns]
-        for column in columns:
-            column += SMALL
-        depends = not np.array_equal(self._in(self._numbering), self._reference)
-        for column, before in zip(columns, kept, strict=True):
-            column[:] = before
-        if depends:
+        # Rotations in space are no sums of unknowns
+        if self._numbering.scene.in_space and not np.array_equal(
+            self._shifted(TURNS, slice(None), SMALL), reference
+        ):
             raise ArgumentError(
                 "gradient: the history depends on rotations in space, of which there is no "
                 "adjoint; take displacements of places of beams or centres of bodies, or use "
@@ -375,17 +366,16 @@ class _History:
 
     def _shifted(self, name: str, dofs: slice, change: Array | float) -> Array:
         """Return the history if some degrees of freedom of a column change; (n+1, ...) or less."""
-        change = np.broadcast_to(change, (len(self._reference), dofs.stop - dofs.start))
-        pieces, first, kept = list[Array](), 0, list[Array]()
+        kept, first = list[tuple[Array, Array]](), 0
         for block in self._blocks:
             piece = block.columns.column_of(name, block.rows)[:, dofs]
-            pieces.append(piece)
-            kept.append(piece.copy())
-            piece += change[first : (first := first + len(piece))]
+            kept.append((piece, piece.copy()))
+            shape = len(self._reference), *piece.shape[1:]
+            piece += np.broadcast_to(change, shape)[first : (first := first + len(piece))]
         try:
             return self._in(self._numbering)
         finally:
-            for piece, before in zip(pieces, kept, strict=True):
+            for piece, before in kept:
                 piece[:] = before
 
 

@@ -64,9 +64,6 @@ class NeighbouringScene:
         """Keep the numbering only."""
         del self.equation, self.supports, self.inertia, self.time_loop, self.q
 
-    def close(self) -> None:
-        """Do nothing; a :class:`Simulation` frees its memory."""
-
 
 @dataclass
 class Beside:
@@ -94,7 +91,8 @@ class Beside:
         for other in (x for some in self.scenes for x in some):
             if self.rows is None:
                 other.equation.callbacks.synchronize()
-            other.close()
+            if isinstance(other, Simulation):
+                other.close()
 
 
 def same_cells(a: DofNumbering, b: DofNumbering) -> bool:
@@ -122,13 +120,12 @@ class Numbers:
 
     def __init__(self, run: Simulation, t1: float) -> None:
         self._run, self._times = run, np.linspace(run.t, t1, SAMPLES)
-        self._values = list[Callable[[Any], Array]]()
-        self._fixed = list[tuple[int, Callable[[Any], Array]]]()
+        self._values, self._fixed = list[Callable[[Any], Array]](), list[Callable[[Any], Array]]()
         for i, term in enumerate(run.equation.terms):
             register = Registered(term, run.subdomain.size)
             term.derivatives(register)
-            self._values += [partial(_of_term, i, values) for values in register.values]
-            self._fixed += [(i, values) for values in register.fixed]
+            for mine, found in ((self._values, register.values), (self._fixed, register.fixed)):
+                mine += [partial(_of_term, i, values) for values in found]
         self._values += [lambda x: x.q, lambda x: x.supports.reactions]
         if run.equation.inertia is not None:
             self._values.append(lambda x: x.inertia.rates)
@@ -143,7 +140,7 @@ class Numbers:
         if self._others or not alike(self._run, other):
             raise Unlike
         terms = self._run.equation.terms, other.equation.terms
-        fixed = ([of(some[i]) for i, of in self._fixed] for some in terms)
+        fixed = ([of(x) for of in self._fixed] for x in (self._run, other))
         same = all(here.is_like(there) for here, there in zip(*terms, strict=True))
         if not (same and all(map(np.array_equal, *fixed))):
             raise Unlike

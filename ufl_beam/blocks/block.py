@@ -26,7 +26,7 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.scene import Scene
-from ufl_beam.terms.derivatives import MOST_MARGINS, Each, Neighbours, differences, in_c
+from ufl_beam.terms.derivatives import MOST_MARGINS, Each, Neighbours, differences
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, LoadTerm, Phases
 
@@ -493,7 +493,7 @@ class Block(LoadTerm):
             strain_bar=np.zeros(b.batches * self._kernels.strains * b.lanes),
         )  # fmt: skip
         self.complete_derivatives(c, neighbours, by_number)
-        return [*found, in_c("block", c)]
+        return [*found, ("block", c)]
 
     def _begins(self, neighbour: Any) -> list[Loop]:
         """Return phases that begin a step in a neighbouring scene before the block does."""

@@ -19,7 +19,7 @@ from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import moves_with_node
 from ufl_beam.model.functions import same_function, value_at
 from ufl_beam.model.loads import Gravity, LineLoad, Load, LoadAlongBeam, MovingLoad, PointLoad
-from ufl_beam.terms.derivatives import Each, Neighbours, in_c
+from ufl_beam.terms.derivatives import Each, Neighbours
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, LoadTerm, Phases
 
@@ -129,7 +129,7 @@ class DeadLoads(LoadTerm):
             now=now, end=end, before=before, enters=enters,
             vector_bar=np.zeros((number, len(dofs))),
         )  # fmt: skip
-        return [in_c("load", c)]
+        return [("load", c)]
 
     def _whole(self, forces: Array) -> Array:
         """Return forces at all local degrees of freedom from forces at the loaded ones."""

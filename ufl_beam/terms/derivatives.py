@@ -219,50 +219,31 @@ def differences(
         "term_differences", parameters=parameters, neighbours=number, size=size,
         term=ffi.new("term_in_steps[]", made), weight=neighbours.weights, here=np.zeros(size),
     )  # fmt: skip
-    return in_c("differences", c)
+    return "differences", c
 
 
-LINEARIZE = {
-    "load": "differentiate_loads", "differences": "begin_neighbours", "block": "tabulate_block",
+FUNCTIONS = {
+    "block": (
+        "tabulate_block", "add_block_derivative", "accept_block_derivative",
+        "accept_block_derivative", "transpose_block_state", "transpose_block", "finish_block",
+    ),
+    "product": ("", "add_product_derivative", "", "", "", "transpose_product", ""),
+    "load": (
+        "differentiate_loads", "add_load_derivative", "accept_load_derivative", "", "",
+        "transpose_loads", "finish_loads",
+    ),
+    "differences": (
+        "begin_neighbours", "add_differences_derivative", "accept_differences_derivative", "", "",
+        "transpose_differences", "",
+    ),
 }  # fmt: skip
-ACCEPT = {
-    name: f"accept_{name}_derivative"
-    for name in (
-        "load",
-        "differences",
-        "block",
-    )
-}
-
-
-def in_c(kind: str, data: Any) -> Each:
-    """Return a derivative of a term: the kind of its functions in C, and their data."""
-    return kind, data
+"""Functions of ``term_derivative``, then of ``term_transposes`` of loops.h, by the kind of a
+derivative; empty if there is none."""
 
 
 def functions(kind: str) -> list[Any]:
-    """Return the functions of ``term_derivative`` of loops.h for a kind; null if there is none."""
-    accept = ACCEPT.get(kind)
-    trial = accept if kind == "block" else None
-    found = LINEARIZE.get(kind), f"add_{kind}_derivative", accept, trial
-    has = (name if name and hasattr(lib, name) else None for name in found)
-    return [ffi.addressof(lib, name) if name else ffi.NULL for name in has]
-
-
-# -- the adjoint -----------------------------------------------------------------------------------
-
-TRANSPOSES = {
-    "block": ("transpose_block_state", "transpose_block", "finish_block"),
-    "product": ("", "transpose_product", ""),
-    "load": ("", "transpose_loads", "finish_loads"),
-    "differences": ("", "transpose_differences", ""),
-}
-"""Functions of ``term_transposes`` of loops.h by the kind of a derivative."""
-
-
-def transposes(kind: str) -> list[Any]:
-    """Return the functions of ``term_transposes`` of loops.h."""
-    return [ffi.addressof(lib, name) if name else ffi.NULL for name in TRANSPOSES[kind]]
+    """Return the functions of :data:`FUNCTIONS` for a kind; null if there is none."""
+    return [ffi.addressof(lib, name) if name else ffi.NULL for name in FUNCTIONS[kind]]
 
 
 def recorded(kind: str, data: Any) -> list[tuple[Any, int]]:

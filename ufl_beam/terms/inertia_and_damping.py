@@ -39,7 +39,6 @@ from ufl_beam.model.loads import Rayleigh
 from ufl_beam.terms.derivatives import (
     Each,
     Neighbours,
-    in_c,
 )
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
@@ -278,7 +277,7 @@ def product_derivative(
     products = [Product(Csr(x, A.indices, A.indptr)).c if x.any() else ffi.NULL for x in changes]
     neighbours.alive.append(products)
     change = ffi.new("constant_matrix *[]", products)
-    return [in_c("product", struct("product_derivative", matrix=matrix, change=change))]
+    return [("product", struct("product_derivative", matrix=matrix, change=change))]
 
 
 # -- damping ---------------------------------------------------------------------------------------
