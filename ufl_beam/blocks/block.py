@@ -109,6 +109,10 @@ class Elements(NamedTuple):
     number_of_groups: int = 0
 
 
+Made = tuple[Statement, Elements]
+"""A statement, and its elements on a process."""
+
+
 def called(function: Any, w: Array) -> Array:
     """Return the outputs of a compiled function of an element; none of no function."""
     out: Array = np.zeros(function.outputs if function else 0)

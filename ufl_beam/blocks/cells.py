@@ -25,10 +25,10 @@ def places(degree: int) -> list[str]:
 
 
 def positions(subdomain: Subdomain, cells: Index) -> Array:
-    """Return the positions of the nodes of local cells, as :func:`places`; (2 * nodes, n); m."""
+    """Return positions of the nodes of local cells, as :func:`places`; (2 or 3 * nodes, n); m."""
     numbering = subdomain.numbering
     at = numbering.points[numbering.nodes_of_cells[subdomain.cells[cells]]]
-    return np.asarray(at.transpose(2, 1, 0).reshape(2 * at.shape[1], len(cells)))
+    return np.asarray(at.transpose(2, 1, 0).reshape(at.shape[1] * at.shape[2], len(cells)))
 
 
 @dataclass(frozen=True)

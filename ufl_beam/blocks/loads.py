@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime, Made
 from ufl_beam.blocks.cells import StatementOnCell, places, positions
 from ufl_beam.blocks.moving_loads import moving_loads
 from ufl_beam.blocks.nodes_in_space import StatementInSpace
 from ufl_beam.blocks.spatial_loads import (
+    ForceOfRotatingFrame,
     LoadOnNode,
     LoadsInSpace,
     PressureInSpace,
-    rotations_in_space,
+    moments_of_rotating_frame,
 )
 from ufl_beam.blocks.statement import Equations, Inputs, Statement
 from ufl_beam.discretization.cell_functions import Cell
@@ -126,8 +127,7 @@ def load_blocks(setting: BlockSetting) -> list[Block]:
     made: Any
     for kind, made in (
         (PointLoad, _at_nodes), (FollowerLoad, _at_nodes), (Pressure, _pressures),
-        (RotatingFrame, rotations_in_space if scene.in_space else _rotations),
-        (MovingLoad, moving_loads),
+        (RotatingFrame, _rotations), (MovingLoad, moving_loads),
     ):  # fmt: skip
         some: list[Any] = [load for load in scene.loads if isinstance(load, kind)]
         if kind is PointLoad:  # forces and, in the plane, moments are no statement
@@ -138,9 +138,7 @@ def load_blocks(setting: BlockSetting) -> list[Block]:
     return blocks
 
 
-def _at_nodes(
-    loads: Sequence[PointLoad | FollowerLoad], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
+def _at_nodes(loads: Sequence[PointLoad | FollowerLoad], setting: BlockSetting) -> Iterator[Made]:
     subdomain, scheme, follows = setting.subdomain, setting.scheme, not loads[0].dead
     mine = np.array([i for i, x in enumerate(loads) if subdomain.computes(x.place)], dtype=int)
     nodes = [subdomain.local(subdomain.numbering.node(loads[i].place)) for i in mine]
@@ -157,9 +155,7 @@ def _at_nodes(
     )  # fmt: skip
 
 
-def _pressures(
-    loads: Sequence[Pressure], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
+def _pressures(loads: Sequence[Pressure], setting: BlockSetting) -> Iterator[Made]:
     subdomain, numbering = setting.subdomain, setting.subdomain.numbering
     pairs = [loaded_cells(load, subdomain) for load in loads]
     cells, shares = map(np.concatenate, zip(*pairs, strict=True))
@@ -182,26 +178,35 @@ def _pressures(
     )  # fmt: skip
 
 
-def _rotations(
-    frames: Sequence[RotatingFrame], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
+def _rotations(frames: Sequence[RotatingFrame], setting: BlockSetting) -> Iterator[Made]:
     (frame,), subdomain, scheme = frames, setting.subdomain, setting.scheme  # one at most
-    numbering, about, in_motion = subdomain.numbering, np.array(frame.about), has_inertia(scheme)
-    mesh, cells, in_time = numbering.mesh, np.arange(len(subdomain.cells)), [InTime(steady, frame)]
-    rhoA = np.array([beam.section.rhoA for beam in numbering.scene.beams])
+    numbering, scene, mesh = subdomain.numbering, setting.scene, subdomain.numbering.mesh
+    d = 3 if (in_space := scene.in_space) else 2
+    rates, about = np.atleast_1d(frame.rate), np.array((*frame.about, 0.0)[:d])
+    cells, in_time = np.arange(len(subdomain.cells)), [InTime(steady, frame)]
+
+    def force(degree: int) -> Statement:
+        if in_space:
+            return ForceOfRotatingFrame(degree, scheme)
+        return ForceOfRotation(degree, scheme.load_weight, mesh.lumped, has_inertia(scheme))
+
+    rhoA = np.array([beam.section.rhoA for beam in scene.beams])
     masses = rhoA[numbering.beam_of_cell[subdomain.cells]] * numbering.lengths(subdomain.cells)
     from_centre = positions(subdomain, cells) - np.repeat(about, mesh.degree + 1)[:, None]
-    rates = np.full(len(cells), frame.rate)
-    yield ForceOfRotation(mesh.degree, scheme.load_weight, mesh.lumped, in_motion), Elements(
-        "rotation of cells", subdomain.cells, subdomain.cell_dofs, [masses, rates, *from_centre],
-        in_time, {"growth": 0}, cells,
+    yield force(mesh.degree), Elements(
+        "rotation of cells", subdomain.cells, subdomain.cell_dofs[:, : 3 * (mesh.degree + 1)],
+        [masses, *np.tile(rates, (len(cells), 1)).T, *from_centre], in_time, {"growth": 0},
+        None if in_space else cells,
     )  # fmt: skip
-    if all_masses := point_masses(numbering.scene):
+    if all_masses := point_masses(scene):
         mine = [
-            (subdomain.local(numbering.node(at)), mass, frame.rate, *(np.array(at.point) - about))
+            (subdomain.local(numbering.node(at))[:3], mass, *rates, *(np.array(at.point) - about))
             for at, mass, _ in all_masses if subdomain.computes(at)
         ]  # fmt: skip
-        nodes, *numbers = map(np.array, zip(*mine, strict=True)) if mine else (np.zeros(0),) * 5
-        yield ForceOfRotation(0, scheme.load_weight, mesh.lumped, in_motion), Elements(
+        none = [np.zeros(0)] * (2 + len(rates) + d)
+        nodes, *numbers = map(np.array, zip(*mine, strict=True)) if mine else none
+        yield force(0), Elements(
             "rotation of masses", np.arange(len(mine)), nodes, numbers, in_time, {"growth": 0},
         )  # fmt: skip
+    if in_space:
+        yield from moments_of_rotating_frame(frame, setting)

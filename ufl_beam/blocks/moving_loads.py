@@ -11,10 +11,10 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.blocks.block import BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import BlockSetting, Elements, InTime, Made
 from ufl_beam.blocks.cells import StatementOnCell, places, positions
 from ufl_beam.blocks.nodes_in_space import unknowns
-from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.cell_functions import AxisOfCell, Cell
 from ufl_beam.mechanics.kinematics import split
@@ -200,9 +200,7 @@ class MovingMass(_OnRoute):
         )  # fmt: skip
 
 
-def moving_loads(
-    loads: Sequence[MovingLoad], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
+def moving_loads(loads: Sequence[MovingLoad], setting: BlockSetting) -> Iterator[Made]:
     """Yield statements and elements of the forces of loads, then of their masses in dynamics."""
     degree, scheme = setting.subdomain.numbering.mesh.degree, setting.scheme
     force = MovingForceInSpace if setting.scene.in_space else MovingForce

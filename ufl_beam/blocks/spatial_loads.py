@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime
+from ufl_beam.blocks.block import Block, BlockSetting, Elements, InTime, Made
 from ufl_beam.blocks.cells import StatementOnCell
 from ufl_beam.blocks.nodes_in_space import (
     FIRST,
@@ -22,7 +22,7 @@ from ufl_beam.blocks.nodes_in_space import (
     unknowns,
     vector,
 )
-from ufl_beam.blocks.statement import Equations, Inputs, Statement
+from ufl_beam.blocks.statement import Equations, Inputs
 from ufl_beam.compiled.c_library import fill
 from ufl_beam.discretization.cells_in_space import cell_axes, rotary_inertia
 from ufl_beam.discretization.function_spaces import Fields
@@ -133,7 +133,7 @@ class ForceOfRotatingFrame(StatementOnCell):
     @property
     def numbers(self) -> list[str]:
         """Mass (kg), angular velocity of the frame (rad/s), positions from its centre (m)."""
-        return ["mass", *RATE, *(f"{c}{k}" for k in range(self.nodes) for c in "XYZ")]
+        return ["mass", *RATE, *(f"{c}{k}" for c in "XYZ" for k in range(self.nodes))]
 
     def equations(self, at: Inputs) -> Equations:
         """See the base class; velocities are means over the step."""
@@ -196,43 +196,20 @@ class LoadsInSpace(Block):
         fill(self._c, turns=acts_at_end(statement.scheme))
 
 
-def rotations_in_space(
-    frames: Sequence[RotatingFrame], setting: BlockSetting
-) -> Iterator[tuple[Statement, Elements]]:
-    """Yield the statements of a rotating frame and their elements."""
-    for frame in frames:  # one at most
-        subdomain, in_time = setting.subdomain, [InTime(steady, frame)]
-        numbering, scheme, bodies = subdomain.numbering, setting.scheme, setting.scene.bodies
-        fields, centre = Fields(subdomain), np.array((*frame.about, 0.0)[:3])
-        nodes = np.array([subdomain.local(numbering.node(x.middle)) for x in bodies], int)
-        lengths, axes = cell_axes(fields)
-        places = fields.coordinates().reshape(-1, 6) - np.tile(centre, 2)
-        masses = lengths * fields.section_values("rhoA").ravel()
-        body_places = np.reshape([x.center for x in bodies], (-1, 3)) - centre
-        for name, dofs, mass, at in (
-            ("rotation of cells", fields.cell_dofs[:, :6], masses, places),
-            (
-                "rotation of masses",
-                nodes.reshape(-1, 6)[:, :3],
-                [x.mass for x in bodies],
-                body_places,
-            ),
-        ):
-            if n := len(mass):
-                rates = np.tile(frame.rate, (n, 1)).T
-                yield ForceOfRotatingFrame(at.shape[1] // 3 - 1, scheme), Elements(
-                    name, np.arange(n), dofs, [np.array(mass), *rates, *at.T], in_time,
-                    {"growth": 0},
-                )  # fmt: skip
-        # Rotary inertia at the nodes of cells, half of each cell, and of bodies
-        J = np.repeat(rotary_inertia(fields, axes) * lengths[:, None, None] / 2, 2, axis=0)
-        J = np.concatenate([J, np.reshape([x.tensor for x in bodies], (-1, 3, 3))])
-        at_nodes = fields.cell_dofs.reshape(-1, 6, 2).transpose(0, 2, 1).reshape(-1, 6)
-        at_nodes = np.concatenate([at_nodes, nodes.reshape(-1, 6)])
-        some = np.flatnonzero(J.any(axis=(1, 2)))
-        rates = np.tile(frame.rate, (len(some), 1)).T
-        if len(some):
-            yield MomentOfRotatingFrame(scheme), Elements(
-                "rotation of inertia", some, at_nodes[some], [*J[some].reshape(-1, 9).T, *rates],
-                in_time, {"growth": 0},
-            )  # fmt: skip
+def moments_of_rotating_frame(frame: RotatingFrame, setting: BlockSetting) -> Iterator[Made]:
+    """Yield the statement of rotary inertia at nodes of cells, half of each cell, and of bodies."""
+    subdomain, bodies = setting.subdomain, setting.scene.bodies
+    fields = Fields(subdomain)
+    lengths, axes = cell_axes(fields)
+    J = np.repeat(rotary_inertia(fields, axes) * lengths[:, None, None] / 2, 2, axis=0)
+    J = np.concatenate([J, np.reshape([x.tensor for x in bodies], (-1, 3, 3))])
+    nodes = [subdomain.local(subdomain.numbering.node(x.middle)) for x in bodies]
+    at_cells = fields.cell_dofs.reshape(-1, 6, 2).transpose(0, 2, 1)
+    at_nodes = np.concatenate([at_cells.reshape(-1, 6), np.reshape(nodes, (-1, 6)).astype(int)])
+    some = np.flatnonzero(J.any(axis=(1, 2)))
+    rates = np.tile(frame.rate, (len(some), 1)).T
+    if len(some):
+        yield MomentOfRotatingFrame(setting.scheme), Elements(
+            "rotation of inertia", some, at_nodes[some], [*J[some].reshape(-1, 9).T, *rates],
+            [InTime(steady, frame)], {"growth": 0},
+        )  # fmt: skip
