@@ -11,7 +11,7 @@ import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
-from functools import partial
+from functools import cached_property, partial
 from inspect import signature
 from typing import Any, NamedTuple, NoReturn
 
@@ -286,7 +286,7 @@ class Case:
             starts: Sequence[Solution | None] = [None] * len(scenes)
             if self.start is not None:
                 start, p = self.start, [*self.at].index(name)
-                starts = start._ends()[p] if fraction == MODEL_STEP else start._runs(p, fraction)
+                starts = start._ends[p] if fraction == MODEL_STEP else start._runs(p, fraction)
             yield from map(self._begin, scenes, starts)
 
     def positions(self, name: str, fraction: float) -> Array:
@@ -567,9 +567,7 @@ class Derivatives:
                 self.ranges[name] = min(earlier, self.ranges[name], key=lambda x: x.change)
             for name, enters in start._enters.items():
                 self._enters[name] |= enters
-        self._shifted: list[list[Solution]] = []
         self._repeated: dict[tuple[int, float], list[Solution]] = {}
-        self._moved_ends: list[list[Solution]] = []
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} = {value:.6g}" for name, value in self.at.items())
@@ -608,7 +606,7 @@ class Derivatives:
         reference = _as_array(quantity(self.solution))
         fractions = [QUANTITY_STEP] * len(self.at)
         try:
-            changes = [self._differences(quantity, reference, some) for some in self._motions()]
+            changes = [self._differences(quantity, reference, some) for some in self._motions]
         except Unknown:
             fractions = [self._fraction(name) for name in self.at]
             runs = (self._runs(p, fraction) for p, fraction in enumerate(fractions))
@@ -678,18 +676,16 @@ class Derivatives:
             q = np.insert(q, at + 1, known + change * slopes[:, p], axis=0)
         return steps, stored, q
 
+    @cached_property
     def _motions(self) -> list[list[Solution]]:
-        """Return motions and reactions at neighbouring values of each parameter."""
-        if not self._shifted:
-            for p, name in enumerate(self.at):
-                scenes = self._case.scenes(name, QUANTITY_STEP)
-                made = [DofNumbering(scene, mesh_of(None, self._case.mesh)) for scene in scenes]
-                changes = self._case.positions(name, QUANTITY_STEP)
-                pairs = zip(made, changes, strict=True)
-                self._shifted.append(
-                    [MotionOnly.of_states(n, self._states(p, x)) for n, x in pairs]
-                )
-        return self._shifted
+        """Motions and reactions at neighbouring values of each parameter."""
+        found = list[list[Solution]]()
+        for p, name in enumerate(self.at):
+            scenes = self._case.scenes(name, QUANTITY_STEP)
+            made = [DofNumbering(scene, mesh_of(None, self._case.mesh)) for scene in scenes]
+            pairs = zip(made, self._case.positions(name, QUANTITY_STEP), strict=True)
+            found.append([MotionOnly.of_states(n, self._states(p, x)) for n, x in pairs])
+        return found
 
     def _fraction(self, name: str) -> float:
         """Return the relative step of a parameter between runs, which do not reach a switch."""
@@ -730,33 +726,33 @@ class Derivatives:
             )
         return self if self._start is None else self._start._first()
 
+    @cached_property
     def _ends(self) -> list[list[Solution]]:
-        """Return ends of runs at neighbouring values of each parameter, to first order.
+        """Ends of runs at neighbouring values of each parameter, to first order.
 
         Internal variables of the run grow by their derivatives, without a switch of any point.
         Accumulated energies do not change; :meth:`_runs` has energies for quantities.
         """
-        if not self._moved_ends:
-            known, (*states, reactions, q, rates) = self.end
-            held = np.zeros(q.shape)
-            held[:, self._constrained_dofs] = reactions
-            changes = {"q": q, "reactions": held}
-            for p, name in enumerate(self.at):
-                simulations = self._case.simulations(name, MODEL_STEP)
-                positions, found = self._case.positions(name, MODEL_STEP), list[Solution]()
-                for simulation, change in zip(simulations, positions, strict=True):
-                    with closing(simulation):
-                        if (inertia := simulation.equation.inertia) is not None:
-                            changes |= zip(inertia.names, rates[V:], strict=True)
-                        both = ((k, known[k], x[p]) for k, x in changes.items() if k in known)
-                        moved = {k: value + change * x for k, value, x in both}
-                        simulation.save_or_restore(Archive(simulation.subdomain, known | moved))
-                        for k, i, of in self._places:
-                            of(simulation.equation.terms[i])[...] += change * states[k][p]
-                        simulation.end()
-                        found.append(simulation.solution)
-                self._moved_ends.append(found)
-        return self._moved_ends
+        known, (*states, reactions, q, rates) = self.end
+        held, ends = np.zeros(q.shape), list[list[Solution]]()
+        held[:, self._constrained_dofs] = reactions
+        changes = {"q": q, "reactions": held}
+        for p, name in enumerate(self.at):
+            ends.append([])
+            simulations = self._case.simulations(name, MODEL_STEP)
+            positions = self._case.positions(name, MODEL_STEP)
+            for simulation, change in zip(simulations, positions, strict=True):
+                with closing(simulation):
+                    if (inertia := simulation.equation.inertia) is not None:
+                        changes |= zip(inertia.names, rates[V:], strict=True)
+                    both = ((k, known[k], x[p]) for k, x in changes.items() if k in known)
+                    moved = {k: value + change * x for k, value, x in both}
+                    simulation.save_or_restore(Archive(simulation.subdomain, known | moved))
+                    for k, i, of in self._places:
+                        of(simulation.equation.terms[i])[...] += change * states[k][p]
+                    simulation.end()
+                    ends[p].append(simulation.solution)
+        return ends
 
     def _repeat(self, simulation: Simulation, p: int, change: float) -> Solution:
         """Return the states of a simulation whose motion follows from a change of a parameter."""

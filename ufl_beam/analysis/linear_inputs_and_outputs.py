@@ -27,10 +27,9 @@ from ufl_beam.output.state_rows import connector_indices, signs_on_second_place
 IMAGINARY = 1e-100  # imaginary change of a configuration; its square vanishes
 SECTION_FORCES = ("N", "V", "M")
 FORCE = ("x", "y", "moment")
+MOTIONS = "displacement", "velocity", "acceleration"
 KINDS: Mapping[str, tuple[str, ...]] = {
-    "displacement": COMPONENTS,
-    "velocity": COMPONENTS,
-    "acceleration": COMPONENTS,
+    **dict.fromkeys(MOTIONS, COMPONENTS),
     "section_forces_at": SECTION_FORCES,
     "connector": ("motion", "rate", "force"),
     "joint": FORCE,
@@ -38,11 +37,8 @@ KINDS: Mapping[str, tuple[str, ...]] = {
 }
 """Components of the results of methods of :class:`Solution` that may be outputs."""
 
-DIRECTIONS = "u", "v", "w"
 IN_SPACE: Mapping[str, tuple[str, ...]] = {
-    "displacement": DIRECTIONS,
-    "velocity": DIRECTIONS,
-    "acceleration": DIRECTIONS,
+    **dict.fromkeys(MOTIONS, ("u", "v", "w")),
     "connector": KINDS["connector"],
     "reaction": ("x", "y", "z"),
 }

@@ -249,18 +249,9 @@ class LinearModel(Rich):
         values = np.atleast_1d(np.asarray(s, dtype=complex))
         if values.ndim != 1 or not np.isfinite(values).all():
             raise ArgumentError(f"transfer_function: s = {shorten(s)} must be finite, (n,)")
-        response = np.zeros((len(self.outputs), len(self.inputs), len(values)), dtype=complex)
-        if self._reduction is not None:
-            A, B, C, D = self.state_space()
-            for k, at in enumerate(values):
-                try:
-                    response[:, :, k] = C @ np.linalg.solve(at * np.eye(len(A)) - A, B) + D
-                except np.linalg.LinAlgError:
-                    raise self._pole(at) from None
-            return response
-        for k, at in enumerate(values):
-            response[:, :, k] = self._response(at)
-        return response
+        responses = np.array([self._response(at) for at in values], dtype=complex)
+        shape = len(values), len(self.outputs), len(self.inputs)
+        return np.ascontiguousarray(responses.reshape(shape).transpose(1, 2, 0))
 
     def frequency_response(self, omega: npt.ArrayLike) -> Complex:
         """Return amplitudes of outputs for harmonic inputs of amplitude 1.
@@ -277,7 +268,13 @@ class LinearModel(Rich):
         return self.transfer_function(1j * values)
 
     def _response(self, s: complex) -> Complex:
-        """Return outputs for inputs ``exp(s t)`` of the full model; (num_outputs, num_inputs)."""
+        """Return outputs for inputs ``exp(s t)``; (num_outputs, num_inputs)."""
+        if self._reduction is not None:
+            A, B, C, D = self._space
+            try:
+                return np.asarray(C @ np.linalg.solve(s * np.eye(len(A)) - A, B) + D)
+            except np.linalg.LinAlgError:
+                raise self._pole(s) from None
         small, (P0, P1, P2), S = self._small, self._outputs.rows, self._inputs.motions
         F, moved = self._loads
         nu = S.shape[1]
@@ -335,7 +332,7 @@ class LinearModel(Rich):
         # Of real, then of imaginary parts
         omega = np.resize(np.sqrt(np.maximum(np.abs(squares), first)), x.shape[1])
         lengths = small.lengths[small.left[self._free]]
-        exact = squares if self._symmetric else None
+        exact = squares if small.symmetric else None
         model = copy.copy(self)
         for name in ("_motion_and_rest", "_space", "states"):
             vars(model).pop(name, None)
@@ -354,7 +351,7 @@ class LinearModel(Rich):
         """
         small = self._small
         K, M = small.K, small.M
-        if self._symmetric:
+        if small.symmetric:
             _, x, works, zero, first = small.undamped(n, (K + K.T) / 2, definite=True)
             masses = np.sum(x * (M @ x), axis=0)
             values = np.where(zero, 0.0, works / masses)
@@ -379,11 +376,6 @@ class LinearModel(Rich):
         first = float(moving.min(initial=small.squares.max()))
         names = [f"part {k} of the modes" for k in range(x.shape[1])]
         return x, squares, np.zeros((len(x), 0)), first, names
-
-    @property
-    def _symmetric(self) -> bool:
-        K = self._small.K
-        return bool(abs(K - K.T).max() <= ROUND_OFF * abs(K).max())
 
     # -- state space ---------------------------------------------------------------------------
 

@@ -37,6 +37,11 @@ MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is
 class SmallMotions(Linearization):
     """Eigenvalues and eigenvectors of the matrices of small motions."""
 
+    @property
+    def symmetric(self) -> bool:
+        """True if the stiffness is symmetric, apart from round-off."""
+        return bool(abs(self.K - self.K.T).max() <= ROUND_OFF * abs(self.K).max())
+
     # -- frequencies ---------------------------------------------------------------------------
 
     def exponents(self, n: int, *, damped: bool = True) -> tuple[Complex, Array | Complex]:
@@ -46,8 +51,7 @@ class SmallMotions(Linearization):
         """
         K, C, M, highest = self.K, self.C, self.M, self.squares.max()
         τ = highest**-0.5
-        round_off = ROUND_OFF * abs(K).max()
-        symmetric = abs(K - K.T).max() <= round_off
+        symmetric, round_off = self.symmetric, ROUND_OFF * abs(K).max()
         matrix = (K + K.T) / 2 if symmetric else K
         _, x, works, zero, first = self.undamped(n, matrix, definite=symmetric)
         if symmetric and (not damped or abs(C).max() <= round_off * τ):
