@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import cached_property, partial
 from inspect import signature
 from typing import Any, NamedTuple, NoReturn
@@ -366,10 +366,10 @@ class Case:
             scene = self.scene(dict(zip(self.at, map(float, changed), strict=True)))
             return NeighbouringScene(run, scene)
 
-        try:
-            both |= {k: beside(k, every) for k in (-1, 1)}
-            linear = numbers.are_linear([*both.values()])
-            if not all(map(numbers.moves_alike, both.values())):  # C needs the terms of all scenes
+        with suppress(ArgumentError, Unlike):
+            low, high = both[-1], both[1] = beside(-1, every), beside(1, every)
+            linear = numbers.are_linear((low, high))
+            if numbers.moving((low, high)):  # C needs the terms of all scenes
                 one_each = [[beside(1, every[p : p + 1])] for p in every if linear]
                 return Beside(one_each, 1 / far[:, None]) if linear else None
             for n in (1, 2, len(every)) if len(every) > FEW else (len(every),):
@@ -379,10 +379,8 @@ class Case:
                         break
                     rows = [x | y for x, y in zip(rows, found, strict=True)] if rows else found
                 else:
-                    both[1].forget()
-                    return Beside([[both[1]]] * len(every), 1 / steps[:, None], rows)
-        except (ArgumentError, Unlike):
-            pass
+                    high.forget()
+                    return Beside([[high]] * len(every), 1 / steps[:, None], rows)
         return None
 
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -157,7 +157,7 @@ def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, li
             if isinstance(x, RotatingFrame):
                 raise ArgumentError(f"{what}: forces of a RotatingFrame have no factor")
         elif isinstance(x, Connector):
-            _require_in_scene(scene, x, what)
+            _require(what, connector_indices, scene, x)
             if not isinstance(x.law, PrescribedForce | Controller | PrescribedMotion):
                 raise ArgumentError(
                     f"{what}: {x} has the law {type(x.law).__name__}; an input has a "
@@ -431,28 +431,24 @@ def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, lis
             raise ArgumentError(f"{what}: {x} is not in the scene")
     elif isinstance(x, Support):
         index_of(scene.supports, x, f"{what}: ")
-    elif isinstance(x, Connector):
-        _require_in_scene(scene, x, what)
-    elif isinstance(x, Joint):
-        _require_known_force(scene, x, rest, what)
+    elif isinstance(x, Connector | Joint):
+        _require(what, connector_indices, scene, x)
+    if isinstance(x, Joint):
+        _require_known_force(x, rest, what)
     return kind, x, [names.index(rest[0])] if rest else [*range(len(names))]
 
 
-def _require_in_scene(scene: Scene, x: Connector | Joint, what: str) -> None:
-    """Raise unless a connector or joint is in the scene."""
+def _require(what: str, check: Callable[..., object], *arguments: Any) -> None:
+    """Let errors of a check begin with the name of an input or output."""
     try:
-        connector_indices(scene, x)
+        check(*arguments)
     except ArgumentError as error:
         raise ArgumentError(f"{what}: {error}") from None
 
 
-def _require_known_force(scene: Scene, joint: Joint, rest: Sequence[str], what: str) -> None:
+def _require_known_force(joint: Joint, rest: Sequence[str], what: str) -> None:
     """Raise unless the force of a joint on its second place is known."""
-    _require_in_scene(scene, joint, what)
-    try:
-        signs_on_second_place(joint)
-    except ArgumentError as error:
-        raise ArgumentError(f"{what}: {error}") from None
+    _require(what, signs_on_second_place, joint)
     if any(isinstance(holder.law, Guide) for holder in joint.holders):
         raise ArgumentError(f"{what}: {joint}: the force of a guide is no output")
     if rest and rest[0] == "moment" and 2 in joint.shared:

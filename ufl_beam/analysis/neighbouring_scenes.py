@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import starmap
 from types import SimpleNamespace
 from typing import Any
 
@@ -192,24 +191,17 @@ class Numbers:
 
     def are_linear(self, both: Sequence[Any]) -> bool:
         """Return whether changes of numbers and functions in two opposite scenes cancel."""
-        if not all(map(_cancel, *map(self.changes, both), self._here)):
-            return False
-        of_three = zip(*map(self._functions, (self._run, *both)), strict=True)
-        for here, *others in of_three:
-            if not all(same_function(here, other) for other in others):
-                three = [[f(float(t)) for t in self._times] for f in (here, *others)]
-                at, before, after = np.array(three)
-                if not _cancel(before - at, after - at, at):
-                    return False
-        return True
+        linear = all(map(_cancel, *map(self.changes, both), self._here))
+        for functions in self.moving(both) if linear else ():
+            at, low, high = np.array([[f(float(t)) for t in self._times] for f in functions])
+            linear &= _cancel(low - at, high - at, at)
+        return linear
 
-    def _functions(self, of: Any) -> list[TimeFunction]:
-        return [function for _, function in of.scene.time_functions()]
-
-    def moves_alike(self, other: Any) -> bool:
-        """Return whether all functions of time are the same in a scene."""
-        both = map(self._functions, (self._run, other))
-        return alike(self._run, other) and all(starmap(same_function, zip(*both, strict=True)))
+    def moving(self, both: Sequence[Any]) -> list[Sequence[TimeFunction]]:
+        """Return functions of time that differ in two scenes, each after that of the run."""
+        scenes = (x.scene.time_functions() for x in (self._run, *both))
+        of_three = [[f for _, f in three] for three in zip(*scenes, strict=True)]
+        return [x for x in of_three if not all(same_function(x[0], other) for other in x)]
 
 
 def _of_term(i: int, values: Callable[[Any], Array], scene: Any) -> Array:
