@@ -18,7 +18,7 @@ pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider
 # With 3 ranks one of them has neighbours on both sides, and sums depend on their order. This matters for shared data:
 # random scenes and their invariance, elimination, gathering, files, agreement. All other units run on 2 ranks only;
 # whole suites on 2 and 3 ranks took half an hour.
-sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,archive checkpoint collective_errors csr factorization file_locks mesh modes output_files parameter_study recorders reference_solver replicas solution static_condensation substructuring))
+sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,archive checkpoint collective_errors csr factorization file_locks mesh modes output_files parameter_study recorders reference_solver replicas solution space_processes static_condensation substructuring))
 cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,the_card four_beam_swing roll_up emergency_stop fibre_damping monte_carlo calibration adaptive_steps lee_frame pushover hinge_snapback rotating_beam concrete_column steel_frame hinges_or_dampers inverted_pendulum))
 
 help: ## this list

@@ -267,6 +267,7 @@ def rod(slenderness):
     return beam, section
 
 
+@pytest.mark.serial  # at 1e6, round-off decides which iterate has the tolerance
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentumStatic()], ids=str)
 @pytest.mark.parametrize("slenderness", SLENDER)
 def test_slender_rods(slenderness, scheme):
@@ -287,7 +288,7 @@ def test_fast_spins(spin):
     beam, _ = rod(20)
     start = ub.Velocity([beam], angular=spin, linear=(0, 0, 0), about=(0.5, 0, 0))
     scene = ub.Scene([beam], initial=[start])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, newton=EXACT, progress=False)
     assert run.substeps > 10
     assert run.energy.worst < 1e-9
 

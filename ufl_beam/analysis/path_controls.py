@@ -118,8 +118,7 @@ class PathCorrector:
         """
         if not self.simulation.scene.in_space:
             return direction
-        numbering, carried = self.subdomain.numbering, direction.copy()
-        nodes = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[:, 3:]
+        nodes, carried = self.subdomain.rotations.reshape(-1, 3), direction.copy()
         p, w = (trial.q1 - trial.step.q0)[nodes] / 4, direction[nodes]
         c, first = 1 / (1 + np.sum(p * p, axis=1, keepdims=True)), np.cross(w, p)
         carried[nodes] = c * (w + 2 * c * (first + np.cross(first, p)))

@@ -387,15 +387,16 @@ class Block(LoadTerm):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore states, functions of time and forces at the end of the last step."""
         name = self._elements.name
-        self._t[0] = archive.number(f"time of {name}", float(self._t[0]))
         if self._c.size:
             self._keep_forces(archive)
-        times = self._times[2, : len(self._elements.in_time), None]
-        indices = np.arange(len(times))
-        times[:] = archive.rows(f"functions of {name}", indices, times, known=True)
+        if functions := len(self._elements.in_time):  # all processes have the block
+            self._t[0] = archive.number(f"time of {name}", float(self._t[0]))
+            times = self._times[2, :functions, None]
+            rows = f"functions of {name}", np.arange(functions), times
+            times[:] = archive.rows(*rows, known=True)
         self.keep_states(archive)
         self._keep_shared(archive)
-        if archive.has(f"time of {name}"):
+        if archive.restores:
             self.start(q)
 
     @property

@@ -149,7 +149,7 @@ def _at_nodes(loads: Sequence[PointLoad | FollowerLoad], setting: BlockSetting) 
     yield (
         LoadOnNode(scheme, follows) if d == 3 else FollowerForce(scheme.load_weight),
         Elements(
-            "follower loads" if follows else "dead moments", mine, np.array(nodes), forces.T,
+            "follower loads" if follows else "dead moments", mine, np.array(nodes, int), forces.T,
             in_time, {"factor": mine},
         ),
     )  # fmt: skip

@@ -304,9 +304,8 @@ class CellsInSpace(BeamCells):
     def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
         """Return the places in the states of the quaternions of vertices, and the vertices."""
         cells = self._elements.indices
-        cell, second = of_vertices(numbering, cells).T
-        own, vertices = np.searchsorted(cells, cell), np.unique(numbering.cells[cells])
-        return places_of_turns(self, own, 4 * second), vertices
+        vertices, cell, second = of_vertices(numbering, cells)
+        return places_of_turns(self, np.searchsorted(cells, cell), 4 * second), vertices
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """See the base class: quaternions."""
@@ -409,17 +408,16 @@ class BodiesInSpace(Block):
 
     def turns(self, numbering: DofNumbering) -> tuple[Index, Index]:
         """Return the places in the states of the quaternions of bodies, and their nodes."""
-        own = np.arange(len(self._elements.indices))
-        return places_of_turns(self, own), len(numbering.points) + own
+        bodies = self._elements.indices
+        return places_of_turns(self, np.arange(len(bodies))), len(numbering.points) + bodies
 
 
 def bodies_in_space(setting: BlockSetting) -> list[BodiesInSpace]:
     """Return the block of the moving bodies, if there are any."""
-    subdomain, bodies = setting.subdomain, setting.scene.bodies
+    mine, bodies, dofs = setting.subdomain.moving_bodies()
     if not bodies:
         return []
-    nodes = np.array([subdomain.local(subdomain.numbering.node(x.middle)) for x in bodies])
     numbers = np.array([np.ravel(body.tensor) for body in bodies]).T
-    elements = Elements("bodies in space", np.arange(len(bodies)), nodes, [*numbers])
+    elements = Elements("bodies in space", mine, dofs, numbers)
     statement = TurningBody(setting.scheme)
     return [BodiesInSpace(statement, elements, setting, kind="inertia")]

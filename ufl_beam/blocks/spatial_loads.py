@@ -198,18 +198,19 @@ class LoadsInSpace(Block):
 
 def moments_of_rotating_frame(frame: RotatingFrame, setting: BlockSetting) -> Iterator[Made]:
     """Yield the statement of rotary inertia at nodes of cells, half of each cell, and of bodies."""
-    subdomain, bodies = setting.subdomain, setting.scene.bodies
+    subdomain, (mine, bodies, nodes) = setting.subdomain, setting.subdomain.moving_bodies()
     fields = Fields(subdomain)
     lengths, axes = cell_axes(fields)
     J = np.repeat(rotary_inertia(fields, axes) * lengths[:, None, None] / 2, 2, axis=0)
     J = np.concatenate([J, np.reshape([x.tensor for x in bodies], (-1, 3, 3))])
-    nodes = [subdomain.local(subdomain.numbering.node(x.middle)) for x in bodies]
     at_cells = fields.cell_dofs.reshape(-1, 6, 2).transpose(0, 2, 1)
-    at_nodes = np.concatenate([at_cells.reshape(-1, 6), np.reshape(nodes, (-1, 6)).astype(int)])
+    at_nodes = np.concatenate([at_cells.reshape(-1, 6), nodes])
+    of_cells = np.add.outer(2 * subdomain.cells, range(2)).ravel()
+    indices = np.append(of_cells, 2 * len(subdomain.numbering.cells) + mine)
     some = np.flatnonzero(J.any(axis=(1, 2)))
     rates = np.tile(frame.rate, (len(some), 1)).T
-    if len(some):
+    if subdomain.largest(float(len(some))):  # on any process
         yield MomentOfRotatingFrame(setting.scheme), Elements(
-            "rotation of inertia", some, at_nodes[some], [*J[some].reshape(-1, 9).T, *rates],
-            [InTime(steady, frame)], {"growth": 0},
+            "rotation of inertia", indices[some], at_nodes[some],
+            [*J[some].reshape(-1, 9).T, *rates], [InTime(steady, frame)], {"growth": 0},
         )  # fmt: skip

@@ -56,8 +56,7 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
         dofs = fields.cell_dofs[:, a::2, None], fields.cell_dofs[:, None, b::2]
         rows, columns = (x.ravel() for x in np.broadcast_arrays(*dofs))
         np.add.at(A.data, A.positions(rows, columns), entries.ravel())
-    for body in fields.subdomain.numbering.scene.bodies:
-        own = fields.subdomain.local(fields.subdomain.numbering.node(body.middle))
+    for body, own in zip(*fields.subdomain.moving_bodies()[1:], strict=True):
         inertia = np.zeros((6, 6))
         inertia[range(3), range(3)], inertia[3:, 3:] = body.mass, body.tensor
         np.add.at(A.data, A.positions(np.repeat(own, 6), np.tile(own, 6)), inertia.ravel())
@@ -241,7 +240,11 @@ def _rotations(turns: Array) -> Rotation:
     return Rotation.from_quat(np.roll(turns + np.eye(4)[0], -1, axis=1))
 
 
-def of_vertices(numbering: DofNumbering, cells: Index) -> Index:
-    """Return a cell of each vertex of some cells, and whether it is its first or second; (n, 2)."""
-    _, first = np.unique(numbering.cells[cells].ravel(), return_index=True)
-    return np.column_stack([cells[first // 2], first % 2])
+def of_vertices(numbering: DofNumbering, cells: Index) -> tuple[Index, Index, Index]:
+    """Return vertices, their first cells, and whether they are first or second; (n,) each.
+
+    Vertices whose first cell is not among the ``cells`` are left out, so each is on one process.
+    """
+    vertices, first = np.unique(numbering.cells.ravel(), return_index=True)
+    some = np.isin(first // 2, cells)
+    return vertices[some], first[some] // 2, first[some] % 2

@@ -138,7 +138,7 @@ class Fields:
                 [connectors[i].component for i in subdomain.connectors], dtype=np.int32
             )
             for offset in range(1, component.max(initial=0) + 1):  # forces of a bushing are coupled
-                later, force = np.flatnonzero(component >= offset), subdomain.connector_dofs[:, 6]
+                later, force = np.flatnonzero(component >= offset), subdomain.connector_dofs[:, -1]
                 couples.append(np.column_stack([force[later], force[later - offset]]))
             self._matrix = zero_matrix(subdomain.size, *couples)
             return self._matrix

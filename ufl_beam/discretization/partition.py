@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.model.bodies import AttachmentPoint, BodyPoint
+from ufl_beam.model.bodies import AttachmentPoint, Body, BodyPoint
 
 
 def bisect(points: Array, number: int) -> Index:
@@ -56,7 +56,8 @@ class Subdomain:
         cell_dofs: Local degrees of freedom of each cell: u of all its nodes, then all v, then all
             ψ; shape (len(cells), 3 (degree + 1)).
         connectors: Numbers of the connectors of this process.
-        body_dofs: Local degrees of freedom of the bodies on this process; shape (num_bodies, 3).
+        bodies: Indices of the bodies of this process in ``scene.rigid_bodies``.
+        body_dofs: Their local degrees of freedom; shape (len(bodies), 3).
         connector_dofs: Local degrees of freedom of ``connectors``: u of both nodes, then v, then ψ,
             then the force; shape (len(connectors), 7).
         effect_dofs: Local degrees of freedom of the effects at places on this process, by their
@@ -92,7 +93,11 @@ class Subdomain:
             np.minimum.at(owner, dofs, rank)
             if rank == comm.rank:
                 of_effects[i] = dofs
-        owner[owner == comm.size] = 0  # for bodies to which nothing is attached
+        # A process has all degrees of freedom of a body, also if joints share some of them.
+        body_dofs = numbering.dofs_of_bodies
+        body_ranks = owner[body_dofs].min(axis=1, initial=comm.size) % comm.size
+        np.minimum.at(owner, body_dofs, body_ranks[:, None])
+        self.bodies = np.flatnonzero(body_ranks == comm.rank)
         self.connectors = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
         number = np.empty(numbering.size, dtype=np.int32)  # global numbers
@@ -102,7 +107,8 @@ class Subdomain:
         ghost = np.zeros(numbering.size, dtype=bool)
         ghost[cell_dofs] = True
         ghost[hinge_dofs[cell_ranks[hinge_cells] == comm.rank]] = True
-        for dofs in (connector_dofs[self.connectors], *of_effects.values()):
+        own_bodies = body_dofs[self.bodies]
+        for dofs in (connector_dofs[self.connectors], own_bodies, *of_effects.values()):
             ghost[dofs] = True
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
@@ -113,8 +119,7 @@ class Subdomain:
         self.cell_dofs = self._local[cell_dofs]
         self.connector_dofs = self._local[connector_dofs[self.connectors]]
         self.effect_dofs = {i: self._local[dofs] for i, dofs in of_effects.items()}
-        body_dofs = self._local[numbering.dofs_of_bodies]
-        self.body_dofs = body_dofs[(body_dofs >= 0).all(axis=1)]
+        self.body_dofs = self._local[own_bodies]
         self._all_owned: Index = order
         if self.alone:  # local numbers and numbers of the scene are equal
             self._local = self._all_owned = self.dofs
@@ -129,14 +134,20 @@ class Subdomain:
         return np.empty(self.size)
 
     def computes(self, point: AttachmentPoint) -> bool:
-        """Return whether this process has the cell at a place, or owns the body of a point.
+        """Return whether this process has the cell at a place, or the body of a point.
 
         This process then has all degrees of freedom of the place, but may not own all of them.
         """
         if isinstance(point, BodyPoint):
-            return bool(self.owns(self.numbering.node(point)).all())
+            return self.numbering.scene.rigid_bodies.index(point.body) in self.bodies
         place = np.searchsorted(self.cells, cell := self.numbering.cell(point))
         return bool(np.any(self.cells[place : place + 1] == cell))
+
+    def moving_bodies(self) -> tuple[Index, list[Body], Index]:
+        """Return indices of the bodies of this process besides the ground, bodies, and dofs."""
+        moving = self.numbering.scene.bodies
+        mine = self.bodies[self.bodies < len(moving)]
+        return mine, [moving[i] for i in mine], self.body_dofs[: len(mine)]
 
     @property
     def plane_rotations(self) -> Index:

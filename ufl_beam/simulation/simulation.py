@@ -126,8 +126,7 @@ class Simulation(Stepper):
         start = chosen_state(start, "start")
         fresh = start is None
         numbering, free_motion = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
-        shared = 0 if scene.in_space else len(numbering.cells)
-        subdomain = Subdomain(numbering, sharing(comm, shared))
+        subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
         together, state = Agreement(subdomain.comm), initial_state(numbering, start)
         q, v, internal, _ = state
         t0, same = continuation(start, scene, t0)

@@ -234,7 +234,7 @@ class StepEquation:
             has_friction(connector.law)
             for connector in self.subdomain.numbering.scene.all_connectors
         )
-        if self.inertia is None or self.supports.work or self.supports.hinges or friction:
+        if self.inertia is None or self.supports.work or self.supports.about or friction:
             self.supports.carry_on(archive, q)
         if self.inertia is not None:
             self.inertia.carry_on(archive, len(self.inertia.more))
@@ -291,6 +291,8 @@ class StepEquation:
         for term in (*self.nodes_in_space, *hinges):
             places, nodes = term.turns(numbering)
             turns[0, nodes] = term.states.ravel()[places]
+        if not self.subdomain.alone:  # each node is on one process
+            self.subdomain.comm.Allreduce(MPI.IN_PLACE, turns)
 
         def rotation_vector(support: Support) -> Array:
             return np.asarray(turns_at(numbering, support.place, turns).as_rotvec()[0])

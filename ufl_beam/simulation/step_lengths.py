@@ -463,7 +463,9 @@ class JudgedSteps(Steps):
         apart = simulation.q - q
         if turns is not None:
             dofs = np.vstack([simulation.numbering.dofs, simulation.numbering.dofs_of_bodies])
+            apart = simulation.subdomain.gather(apart)
             apart[dofs[:, 3:]] = rotations_between(turns, simulation.now.turns(0))
+            apart = apart[simulation.subdomain.dofs]
         self.error = max(self.error, REMAINING * ahead.size_of(apart))
 
     def state(self) -> State:

@@ -470,9 +470,16 @@ class Stepper(StateView):
         if failure == lib.NO_EQUILIBRIUM:
             self.together.synchronize(self.solver.error() or error)
             raise self.solver.failure()
+        if failure == lib.TURNS_TOO_FAR and c.turn < 0:
+            driven = " or ".join(str(x) for x in self.supports.about if 5 in x.moving)
+            raise StepFailed(
+                f"{driven} turns by {math.degrees(-c.turn):.0f}° in the step, more than the limit "
+                f"of 135°; with dt = {math.pi / 3 / -c.turn * c.step.dt:.1e} s it would turn by "
+                "about 60°"
+            )
         if failure == lib.TURNS_TOO_FAR and self.scene.in_space:
-            rotations = self.subdomain.rotations
-            vectors = self._copy(c.s)[rotations].reshape(-1, 3)
+            rotations = self.numbering.rotations
+            vectors = self.subdomain.gather(self._copy(c.s))[rotations].reshape(-1, 3)
             largest = int(rotations[3 * int(np.argmax(np.hypot.reduce(vectors.T)))])
             angle, wanted = 2 * math.atan(c.turn / 2), 2 * math.tan(math.pi / 6)
             raise StepFailed(

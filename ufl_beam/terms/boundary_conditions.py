@@ -38,8 +38,9 @@ class Supports:
         pivots: Values of the diagonal entries of ``dofs`` in the constrained matrix.
         turned, axes: Number of rotations of axes; their ``turned_axes`` of loops.h.
         motions: Each moving local degree of freedom, its function of time, and its support.
-        hinges: Each support in space with an axis, and the rotations of its node, (3,), of which
-            the last one is about the axis.  Those with a prescribed rotation are first.
+        about: Supports of the scene in space with an axis, on any process.
+        hinges: Each of these on this process, and the rotations of its node, (3,), of which the
+            last one is about the axis.  Those with a prescribed rotation are first.
         angles: Rotations of the hinges; rad.
         moving: Local degrees of freedom whose values depend on time.
         work: True if any support of the scene, on any process, moves.
@@ -71,7 +72,8 @@ class Supports:
                     group.extend((dof, motion, support) for dof in local_dofs)
             if support.axis is not None:
                 own = support, subdomain.local(dofs[3:])
-                (driven if 5 in support.moving else free).append(own)
+                if len(own[1]):
+                    (driven if 5 in support.moving else free).append(own)
         self.motions += of_hinges
         self.hinges, self._driven = [*driven, *free], len(driven)
         self.turned, self.axes, self._alive = len(turned), ffi.new("turned_axes[]", turned), turned
@@ -82,8 +84,10 @@ class Supports:
         columns, rows = np.flatnonzero(is_constrained[A.indices]), A.entries_of(self.dofs)
         self.entries = np.union1d(columns, rows), A.positions(self.dofs, self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
-        self._scheme, self._ledger = scheme, ledger
-        self.work = any(support.moving for support in subdomain.numbering.scene.supports)
+        self._scheme, self._ledger, self._subdomain = scheme, ledger, subdomain
+        supports = subdomain.numbering.scene.supports
+        self.work = any(support.moving for support in supports)
+        self.about = [support for support in supports if support.axis is not None]
         if self.work:
             ledger.supplied["supports"] += 0.0
         self.angles: Array = np.zeros(len(self.hinges))
@@ -171,8 +175,10 @@ class Supports:
 
     @property
     def angle_of(self) -> dict[Support, float]:
-        """Angles of the hinges; rad."""
-        return dict(zip((support for support, _ in self.hinges), self.angles, strict=True))
+        """Angles of the supports :attr:`about` an axis; rad.  All processes read it together."""
+        own = [(self.about.index(x), a) for (x, _), a in zip(self.hinges, self.angles, strict=True)]
+        everyone = [own] if self._subdomain.alone else self._subdomain.comm.allgather(own)
+        return {self.about[i]: float(angle) for some in everyone for i, angle in some}
 
     def find_angles(self, turns: Callable[[Support], Array], t: float) -> None:
         """Set the angles of hinges from rotation vectors of their places, ``turns``.
@@ -182,11 +188,14 @@ class Supports:
         Raises:
             ModelError: The place of a hinge has turned about another axis.
         """
-        for k, (support, _) in enumerate(self.hinges):
+        of_node = [support for support, _ in self.hinges]
+        for support in self.about:  # all processes raise
             turn, axis = turns(support), np.array(support.axis) / np.linalg.norm(support.axis)
             angle = float(turn @ axis)
-            whole = value_at(support.moving[5], t, support) - angle if k < self._driven else 0.0
-            self.angles[k] = angle + 2 * math.pi * round(whole / (2 * math.pi))
+            whole = value_at(support.moving[5], t, support) - angle if 5 in support.moving else 0.0
+            if support in of_node:
+                turns_so_far = 2 * math.pi * round(whole / (2 * math.pi))
+                self.angles[of_node.index(support)] = angle + turns_so_far
             if np.abs(turn - angle * axis).max() > 1e-9:
                 raise ModelError(
                     f"start: {support} turns about {support.axis}, but its place has turned about "

@@ -284,7 +284,7 @@ static int find_change(equation *e, const double *x, int anew, int *failed)
   if (anew) assemble(e, x);
   if (e->agree) {
     *failed = e->solve(e->handle, anew);
-    return 0;
+    return e->rotations ? update_ghosts(e, e->y) : 0; /* see move_to */
   }
   if (anew) TRY(factor_tangent(e, failed));
   return *failed ? 0 : solve_tangent(e, anew);

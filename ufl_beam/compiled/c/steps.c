@@ -126,7 +126,7 @@ static const double LARGEST_TURN = 2.356;
 static const double FARTHEST = 2;
 
 /* Initial guess of the end of the step in the axes of supports: extrapolation of the last steps,
- * and the prescribed motions of supports. Returns 0 if a support turns too far. */
+ * and the prescribed motions of supports. Returns 0 if a support in space turns too far; `turn` is minus its angle. */
 static int guess(time_loop *m)
 {
   const moving_supports *p = m->supports;
@@ -135,6 +135,7 @@ static int guess(time_loop *m)
   double far = 0;
   for (int k = 0; k < e->rotations; ++k)
     far = fmax(far, fabs(q[e->rotation[k]] - m->prediction->q_before[e->rotation[k]]));
+  if (e->rotations) far = over_processes(e, LARGEST, far);
   if (m->prediction->known >= POINTS_OF_GUESS) predict_stage(m->prediction, m->step.t1, m->guess);
   else if (far > FARTHEST) memcpy(m->guess, q, m->size * sizeof *q);
   else predict(m->prediction, m->step.dt, q, m->guess);
@@ -160,6 +161,7 @@ static int guess(time_loop *m)
       const int i = p->hold[p->hinge[k].across[j]];
       m->guess[i] = q[i];
     }
+  if (m->axes == 3) turn = over_processes(e, LARGEST, turn), m->turn = -turn;
   return turn <= LARGEST_TURN;
 }
 
