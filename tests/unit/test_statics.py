@@ -217,18 +217,6 @@ def test_a_shallow_truss_is_refused_at_its_limit_load(scale):
         assert ended.value.time == pytest.approx(1 / 1.3, rel=0.02)
 
 
-def test_works_by_the_slopes_of_the_path():
-    """Long steps of a cantilever, whose trapezoidal work is far from the energy."""
-    section = ub.Section(EA=1e6, GA=1e6, EI=1.0)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=8)
-    push = ub.PointLoad(beam.end, force=(0, 10.0), amplitude=lambda t: t)
-    many, few = (run(clamped(beam, loads=[push]), ub.Static(), dt=dt) for dt in (0.1, 0.5))
-    assert few.substeps == 2
-    tips = [x.displacement(beam.end)[-1] for x in (many, few)]
-    assert np.abs(tips[0] - tips[1]).max() < 1e-6
-    assert few.energy.worst > 0.15
-
-
 def test_a_start_in_equilibrium_stays():
     """Loads that joints alone bear move nothing: works are round-off, which no check may judge."""
     for angle in np.linspace(0, 6.2, 7):

@@ -97,6 +97,7 @@ class Subdomain:
         body_dofs = numbering.dofs_of_bodies
         body_ranks = owner[body_dofs].min(axis=1, initial=comm.size) % comm.size
         np.minimum.at(owner, body_dofs, body_ranks[:, None])
+        owner[owner == comm.size] = 0  # of nothing, see state_transfer.py
         self.bodies = np.flatnonzero(body_ranks == comm.rank)
         self.connectors = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")

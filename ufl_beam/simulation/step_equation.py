@@ -513,9 +513,8 @@ class StaticPath:
     the step stores and dissipates.  Otherwise Newton's method may have found another branch of
     equilibria, beyond a limit load or where softening releases more energy than it dissipates.
     The ``slack`` of the scheme limits the imbalance of work.  The work of the residual that
-    Newton's method leaves does not count.  A step of elastic beams is accepted, too, if the
-    internal forces grow faster and faster along the straight line from its beginning to its end, as
-    in a straight rope, or if the work agrees by Hermite's rule.
+    Newton's method leaves does not count.  A step is accepted, too, if the internal forces grow
+    faster and faster along the straight line from its beginning to its end, as in a straight rope.
 
     The initial state, ``q`` at ``t0``, is in equilibrium with the vectors ``loads``.  Reactions are
     set from this equilibrium, unless the run ``goes_on`` from a static run of the same scene,
@@ -544,8 +543,7 @@ class StaticPath:
         self.c = struct(
             "static_path", slack=scheme.slack, far=LARGEST_MOTION, kink=KINK_IMBALANCE,
             per_far=subdomain.numbering.scales[subdomain.dofs],
-            force=self.force, after=np.zeros_like(q), growth=np.zeros_like(q), terms=len(changes),
-            weight_of_before=scheme.weight_of_before,
+            force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
             change=ffi.new("change_call[]", changes), accounts=len(accounts),
             account=ffi.new("double *[]", [doubles(entries.amounts) for entries in accounts]),
             entries=np.array([len(entries) for entries in accounts], dtype=np.int32),

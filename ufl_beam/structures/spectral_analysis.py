@@ -226,7 +226,9 @@ def response_spectrum_analysis(
     require_kind(scene, Scene, f"{what}: scene")
     n = require_count(n, f"{what}: n")
     along_x = (1.0, 0.0, 0.0)[: 3 if scene.in_space else 2]
-    toward = np.array(require_point(direction or along_x, f"{what}: direction"))
+    toward = np.array(
+        require_point(along_x if direction is None else direction, f"{what}: direction")
+    )
     if len(toward) != len(along_x) or not (size := math.hypot(*toward)) > 0.0:
         raise ArgumentError(
             f"{what}: direction = {shorten(direction)} must have {len(along_x)} components, and a "

@@ -13,13 +13,14 @@ static inline void insert_rows_of_six(const cells *c, const lanes *e, const int3
 {
   /* Rows of the second vertices come last: adjacent cells add to the same rows, and would wait for
    * each other. */
+  enum { HALF = SIDE < 2 ? 1 : SIDE / 2 };
   for (int k = 0; k < SIDE; ++k) {
-    const int i = k % (SIDE / 2) * 2 + k / (SIDE / 2);
-    for (int part = 0; part < SIDE / 6; ++part) {
+    const int i = k % HALF * 2 + k / HALF;
+    for (int six = 0; six < SIDE / 6; ++six) {
       double *row[LANES];
       for (int l = 0; l < LANES; ++l)
-        row[l] = b + c->begin[dofs[l * SIDE + i]] + pattern[LANES * (SIDE * i + part) + l];
-#define FOUR(j) (*(const four *)((const double *)(e + SIDE * i + (part * 6 + (j)) % (SIDE / 2) * 2 + (part * 6 + (j)) / (SIDE / 2)) + l))
+        row[l] = b + c->begin[dofs[l * SIDE + i]] + pattern[LANES * (SIDE * i + six) + l];
+#define FOUR(j) (*(const four *)((const double *)(e + SIDE * i + (six * 6 + (j)) % HALF * 2 + (six * 6 + (j)) / HALF) + l))
 #define EVEN(a, b) __builtin_shufflevector(a, b, 0, 4, 2, 6)
 #define ODD(a, b) __builtin_shufflevector(a, b, 1, 5, 3, 7)
 #define LOWER(a, b) __builtin_shufflevector(a, b, 0, 1, 4, 5)

@@ -340,9 +340,9 @@ typedef struct {
   uint8_t swap[6];
 } rows_of_six;
 
-enum { F = 6 }; /* column of right-hand sides */
+enum { OF_RIGHT = 6 }; /* column of right-hand sides */
 
-static inline octet six(const double *x) { return (octet){x[0], x[1], x[2], x[3], x[4], x[5]}; }
+#define SIX(x) {(x)[0], (x)[1], (x)[2], (x)[3], (x)[4], (x)[5]}
 
 /* Pivot block k becomes LU, and the other columns L^-1 times them, with column pivoting, as factor_rows does. L is in `low`,
  * the reciprocals of the pivots are in `over`. Numbers of rows are not changed: vectors that are partly new take long to load. */
@@ -364,10 +364,10 @@ static inline void eliminate_column(rows_of_six *at, const int k, const int spik
   const octet a = A[k], b = B[k], c = C[k];
   const double over = at->over[k] = 1 / A[k][k]; /* not finite for a singular block, and so are the results */
   for (int i = k + 1; i < 6; ++i) {
-    const double part = at->low[6 * k + i] = A[i][k] * over;
-    A[i] -= part * a;
-    B[i] -= part * b;
-    if (spike) C[i] -= part * c;
+    const double ratio = at->low[6 * k + i] = A[i][k] * over;
+    A[i] -= ratio * a;
+    B[i] -= ratio * b;
+    if (spike) C[i] -= ratio * c;
   }
 }
 
@@ -433,8 +433,8 @@ static inline void end_six(const chains *c, const rows_of_six *at)
     for (int r = 0; r < 6; ++r)
       for (int k = 0; k < 6; ++k) c->left_data[*place++] += blocks[i][r][k];
   for (int r = 0; r < 6; ++r) {
-    c->left_f[numbers[r]] += at->from[r][F];
-    c->left_f[numbers[6 + r]] += at->next[r][F];
+    c->left_f[numbers[r]] += at->from[r][OF_RIGHT];
+    c->left_f[numbers[6 + r]] += at->next[r][OF_RIGHT];
   }
 }
 
@@ -447,8 +447,8 @@ static inline void eliminate_six(const chains *c, rows_of_six *at, int number, c
     octet right[6];
     if (v == x->last) read_block_of_end(c, 6, x->chain, LAST_RIGHT, (double *)right, 8, 1);
     for (int r = 0; r < 6; ++r) {
-      const octet after = v < x->last ? six(row + width * r) : right[r];
-      x->after[r] = (octet){after[0], after[1], after[2], after[3], after[4], after[5], x->next[r][F] + b[c->dof[v] + r]};
+      x->after[r] = v < x->last ? (octet)SIX(row + width * r) : right[r];
+      x->after[r][OF_RIGHT] = x->next[r][OF_RIGHT] + b[c->dof[v] + r];
       x->pivot[r] = x->next[r], x->swap[r] = (uint8_t)r;
       if (spike) x->to[r] = x->next_to[r];
     }
@@ -466,20 +466,20 @@ static inline void eliminate_six(const chains *c, rows_of_six *at, int number, c
     const double *row = c->data + c->begin[v + inside], *below = inside ? row + c->at[3 * (v + 1)] : end;
     if (inside) row += c->at[3 * (v + 1) + 1];
     else read_block_of_end(c, 6, x->chain, RIGHT_LAST, end, 6, 1);
-    for (int r = 0; r < 6; ++r) x->next[r] = inside ? six(row + 18 * r) : (octet){0};
+    for (int r = 0; r < 6; ++r) x->next[r] = inside ? (octet)SIX(row + 18 * r) : (octet){0};
     subtract_six(below, inside ? 18 : 6, x->after, x->next);
     if (spike) {
       octet from[6] = {0};
       memset(x->next_to, 0, sizeof x->next_to);
       subtract_six(below, inside ? 18 : 6, x->to, x->next_to);
       subtract_six((double *)x->from, 8, x->to, x->left);
-      for (int r = 0; r < 6; ++r) from[r][F] = x->from[r][F];
+      for (int r = 0; r < 6; ++r) from[r][OF_RIGHT] = x->from[r][OF_RIGHT];
       subtract_six((double *)x->from, 8, x->after, from);
       memcpy(x->from, from, sizeof from);
       drop_faded_six(x->next_to, x->faded), drop_faded_six(x->from, x->faded);
     }
     for (int r = 0; r < 6; ++r) {
-      f[r] = x->after[r][F], c->swaps[6 * v + r] = x->swap[r];
+      f[r] = x->after[r][OF_RIGHT], c->swaps[6 * v + r] = x->swap[r];
       for (int k = 0; k < 6; ++k) {
         pivot[6 * r + k] = k < r ? x->low[6 * k + r] : k > r ? x->pivot[r][k] : x->over[r];
         to_next[6 * r + k] = x->after[r][k];

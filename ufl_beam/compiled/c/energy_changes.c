@@ -2,9 +2,8 @@
 /* Energies that a static step changes, before it is accepted; see energy_ledger.py. */
 
 /* Energy that points store and dissipate in a step to q1. */
-static double change_by_response(const element_block *b, const double *q1, energy_change *sum)
+static double change_by_response(const element_block *b, const double *q1)
 {
-  sum->in_points = 1;
   points *p = respond_in(b, q1);
   double after[POINT_OUTPUTS], change = 0;
   end_points(p, after, 0);
@@ -32,7 +31,7 @@ void change_of_block(void *self, const double *q1, energy_change *sum)
     if (b->power_of) sum->in_connectors += w[(size_t)(i / n) * b->width * n + i % n];
   }
   for (int k = 0; elastic && k < b->stored; ++k) sum->in_connectors -= b->energy[k];
-  if (b->inner) sum->in_connectors += change_by_response(b, q1, sum);
+  if (b->inner) sum->in_connectors += change_by_response(b, q1);
 }
 
 /* Energy that cells store in a step to q1, without the energy that they supply. */
@@ -40,7 +39,7 @@ void change_of_cells(void *self, const double *q1, energy_change *sum)
 {
   const element_block *b = self;
   double *out = b->out, before = 0;
-  if (b->inner) sum->in_beams += change_by_response(b, q1, sum);
+  if (b->inner) sum->in_beams += change_by_response(b, q1);
   gather(b, q1, 0);
   if (b->end_of) FOR_ACTING(b, c) {
     evaluate_batch(b, b->end_of, c, out);

@@ -760,7 +760,7 @@ typedef struct {
 
 /* Energy stored and dissipated in a step, and the sum of the magnitudes of the works on
  * connectors and on imposed strains. */
-typedef struct { double in_beams, in_connectors, effort; int in_points; } energy_change; /* in_points: whether of laws of points */
+typedef struct { double in_beams, in_connectors, effort; } energy_change;
 
 /* Adds the contribution of a term in a step to q1. */
 typedef void (change_of_energy)(void *self, const double *q1, energy_change *sum);
@@ -775,7 +775,6 @@ typedef struct {
   double slack, far, kink;
   const double *per_far; /* 1 / size of the scene for displacements, 1 for rotations */
   double *force, weight_of_before; /* internal forces before the step */
-  double *after, *growth; /* internal forces after it; their change in the axes of supports */
   int terms;
   const change_call *change;
   int accounts; /* arrays of the ledger */

@@ -360,43 +360,6 @@ static int stiffens(time_loop *m)
   return grows;
 }
 
-/* Whether the energy of a static step to `guess` is its work by Hermite's rule, of fourth order for loads that are linear in
- * the step; overwrites the step of the nodes. By the tangents at both ends the change of the forces moves the nodes along the path. In a leap the forces do work on a way that the slopes at its ends do not tell. */
-static int bends_smoothly(time_loop *m, double slack)
-{
-  static_path *p = m->path;
-  equation *e = m->equation;
-  for (int end = 1; end >= 0; --end) {
-    int failed;
-    double slope = 0, half[4];
-    memcpy(e->unknowns, end ? m->guess : m->q, m->size * sizeof *m->q);
-    turn_axes(e->turned, e->axes, e->unknowns, 1);
-    restart(e, EXACT);
-    residual_at(e, e->unknowns);
-    if (end) memcpy(p->after, e->inner_force, m->size * sizeof *p->after);
-    for (int i = 0; i < e->size; ++i) e->residual[i] = p->after[i] - p->force[i];
-    turn_axes(e->turned, e->axes, e->residual, 1);
-    exchange_ghosts(e, e->f, ADD_VALUES, REVERSE);
-    for (int k = 0; k < e->held; ++k) e->residual[e->hold[k]] = 0;
-    memcpy(p->growth, e->residual, e->size * sizeof *p->growth);
-    if (find_change(e, e->unknowns, 1, &failed) || failed || raised_anywhere(e) != NOTHING) return 0;
-    for (int k = 0; end && k < e->rotations; k += 3) { /* spins about the axes of the rotations */
-      const int32_t *i = e->rotation + k;
-      const double s[] = {m->guess[i[0]] - m->q[i[0]], m->guess[i[1]] - m->q[i[1]], m->guess[i[2]] - m->q[i[2]]};
-      take_half(s, half);
-      for (int j = 0; j < 3; ++j) p->growth[i[j]] /= 1 + half[1] * half[1] + half[2] * half[2] + half[3] * half[3];
-    }
-    for (int i = 0; i < e->owned; ++i) slope += p->growth[i] * e->change[i];
-    slope = over_processes(e, TOTAL, slope);
-    if (!(slope >= 0)) return 0;
-    p->work += (2 * end - 1) * slope / 12;
-  }
-  memcpy(e->unknowns, m->guess, m->size * sizeof *m->q);
-  turn_axes(e->turned, e->axes, e->unknowns, 1);
-  residual_at(e, e->unknowns);
-  return fabs(p->work - p->stored) <= slack;
-}
-
 /* Check that a static step has followed its path: no node moves as a mechanism does, and the work
  * of internal forces equals the energy stored and dissipated; see step_equation.py. */
 static int followed(time_loop *m)
@@ -438,10 +401,8 @@ static int followed(time_loop *m)
   if (fabs(p->work - p->stored) <= slack + p->kink * (of[THROUGH] + p->rejected)) return 1;
   /* Between both ends the forces of connectors are not those of their laws. */
   const int one_branch = !m->opens && !e->border && over_processes(e, LARGEST, e->again.number) == 0;
-  if (one_branch && of[EFFORT] + fabs(of[CONNECTORS]) <= p->slack * fabs(of[BEAMS])) {
-    if (stiffens(m)) return !e->rotations || measure(m); /* for moments in axes of the nodes at the end */
-    if (over_processes(e, LARGEST, sum.in_points) == 0 && bends_smoothly(m, slack)) return measure(m);
-  }
+  if (one_branch && of[EFFORT] + fabs(of[CONNECTORS]) <= p->slack * fabs(of[BEAMS]) && stiffens(m))
+    return !e->rotations || measure(m); /* for moments in axes of the nodes at the end */
   if (p->rejected == 0) p->rejected = size;
   return fails(m, LEAPS);
 }
