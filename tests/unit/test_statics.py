@@ -217,6 +217,21 @@ def test_a_shallow_truss_is_refused_at_its_limit_load(scale):
         assert ended.value.time == pytest.approx(1 / 1.3, rel=0.02)
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.37, 2.2, 4.0])
+def test_a_pendulum_hangs_in_any_direction(angle):
+    """The first tangent is singular to round-off, which is no less a mechanism than zero."""
+    c, s = np.cos(angle), np.sin(angle)
+    down, aside = np.array([s, -c]), np.array([c, s])
+    section = ub.Section(EA=1e4, GA=1e4, EI=500.0, rhoA=1.0, rhoI=10.0)
+    beam = ub.Beam((0, 0), tuple(3 * down), section, cells=3)
+    push = ub.PointLoad(beam.end, force=tuple(0.1 * aside), amplitude=lambda t: t)
+    joint = ub.Revolute(ub.ground(0, 0), beam.start)
+    loads = [ub.Gravity(tuple(9.81 * down)), push]
+    shape = run(ub.Scene([beam], joints=[joint], loads=loads), ub.Static(), dt=0.5).shape(beam)
+    weight = 9.81 * (shape[:-1] + shape[1:]) / 2  # of cells of 1 m and 1 kg
+    assert weight.sum(axis=0) @ aside == pytest.approx(0.1 * (shape[-1] @ down), rel=1e-6)
+
+
 def test_a_start_in_equilibrium_stays():
     """Loads that joints alone bear move nothing: works are round-off, which no check may judge."""
     for angle in np.linspace(0, 6.2, 7):

@@ -32,7 +32,7 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.beam_elimination import CondensedSolver
 from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
-from ufl_beam.solvers.null_vectors import soft_motions
+from ufl_beam.solvers.null_vectors import SINGULAR, soft_motions
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -205,14 +205,17 @@ class Solver:
         subdomain, A, numbering = self._subdomain, self._equation.A, self._subdomain.numbering
         if (found := soft_motions(self._equation)) is None:
             return False
-        _, free, _, vectors = found
+        _, free, sizes, vectors = found
+        doubted = self.c.doubt == lib.DOUBTED
+        if doubted and not sizes[-1] <= SINGULAR:
+            return False
         motions = numbering.scales[free, None] * vectors
         # One degree of freedom for each mode, chosen so that the modes are independent there
         pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
         dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
         chosen = np.isin(subdomain.dofs, dofs)
         new = chosen & (self._stiffness == 0.0)
-        forced = chosen & (self._residuals() > FORCED * self.scale())
+        forced = chosen & (self._residuals() > FORCED * self.scale()) & (not doubted)
         if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
             return False
         rotations = np.isin(subdomain.dofs, numbering.rotations)

@@ -52,6 +52,9 @@ struct cells {
  * at extrapolated strains; exact: later forces are forces at the iterate, not predicted; stale: whether a tangent has
  * been computed since the prediction; to: the configuration to which the tangent has predicted a change, in space, if
  * it is not the iterate; in_space: whether cells have motions to it. */
+/* Whether a first change that is very long makes a tangent singular, see goes_astray of newton.c. */
+enum doubt { CERTAIN, DOUBTS, DOUBTED };
+
 typedef struct { int32_t begins, exact, stale, in_space; const double *to; } predicted_forces;
 
 /* Some entries of a vector, or all of them. */
@@ -471,6 +474,7 @@ typedef struct {
   int careful;           /* whether changes are scaled by a line search */
   int monitored;         /* whether options of PETSc or monitors ask for PETSc's own method */
   int searches;          /* whether the line search of newton.c is used nevertheless */
+  enum doubt doubt;
   int error;             /* of PETSc */
   int raised;            /* see enum raised */
   const border *border;  /* or none */

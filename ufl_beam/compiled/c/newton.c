@@ -432,6 +432,17 @@ static int search(equation *e, double *x)
   }
 }
 
+/* Whether the first change of a static step from a state without internal forces is so long that only round-off resists
+ * it: forces that the step brings may resist it, as weight holds a pendulum. */
+static int goes_astray(const equation *e)
+{
+  double far = 0;
+  if (e->iterations || over_processes(e, HYPOT, e->inner_size) > e->rtol * e->loads) return 0;
+  for (int i = 0; i < e->owned; ++i)
+    if (e->weight[i] > 0) far = fmax(far, fabs(e->change[i]) / e->weight[i]);
+  return over_processes(e, LARGEST, far) > 1e3 * e->scene;
+}
+
 /* Newton's method from the iterate x; `reason` tells why it ends. */
 static int newton(equation *e, double *x)
 {
@@ -448,6 +459,7 @@ static int newton(equation *e, double *x)
     }
     int failed;
     TRY(find_change(e, x, !e->near, &failed));
+    if (!failed && e->doubt == DOUBTS && goes_astray(e)) e->doubt = DOUBTED, failed = 1;
     if (failed) {
       e->reason = SINGULAR;
       return 0;
@@ -587,12 +599,16 @@ static int iterate_from(equation *e, const double *guess, int patience, enum tan
 {
   const double start = e->border ? *e->border->t : 0;
   enum { FRESH, HELD, FREE } motions = FRESH;
+  e->doubt = e->product || e->border ? CERTAIN : DOUBTS;
   for (int from_guess = 1;;) {
     if (from_guess && e->border) *e->border->t = start;
     if (from_guess) go_to(e, guess, kind);
     const int reason = iterate(e, patience, 0);
     if (motions == FREE || reason > 0 || e->error || raised_anywhere(e) == OTHER) return reason;
-    if (reason == SINGULAR && e->find_zero_modes(e->handle)) motions = HELD;
+    const int doubted = e->doubt == DOUBTED, held = reason == SINGULAR && e->find_zero_modes(e->handle);
+    e->doubt = CERTAIN;
+    if (held) motions = HELD;
+    else if (doubted) from_guess = 1;
     else if ((reason == SINGULAR || motions == HELD) && e->forget_zero_modes(e->handle))
       from_guess = motions != HELD, motions = FREE;
     else return reason;
