@@ -572,7 +572,7 @@ static inline void feel_first_vertex(const chains *c, const int n, int chain, do
   for (int v = end - 2; v >= c->first[chain]; --v) {
     read_vertex(c, n, c->f, v, x);
     subtract(n, c->to_next + n * n * v, y, x);
-    memcpy(y, x, sizeof y);
+    memcpy(y, x, n * sizeof *y);
   }
   read_block_of_end(c, n, chain, LEFT_FIRST, from, n, 1);
   subtract(n, from, y, left);
@@ -654,7 +654,7 @@ static inline void expand_blocks(const chains *c, const int n, const double *lef
         if (v < c->first[chain + l]) continue;
         read_vertex(c, n, c->f, v, y);
         subtract(n, c->to_next + n * n * v, next[l], y);
-        memcpy(next[l], y, sizeof y);
+        memcpy(next[l], y, n * sizeof *y);
         write_vertex(c, n, y, v, x);
       }
   }
