@@ -198,7 +198,7 @@ class Numbers:
         return linear
 
     def moving(self, both: Sequence[Any]) -> list[Sequence[TimeFunction]]:
-        """Return functions of time that differ in two scenes, each after that of the run."""
+        """Return the functions of time that differ: of the run, then of both other scenes."""
         scenes = (x.scene.time_functions() for x in (self._run, *both))
         of_three = [[f for _, f in three] for three in zip(*scenes, strict=True)]
         return [x for x in of_three if not all(same_function(x[0], other) for other in x)]

@@ -186,7 +186,8 @@ class Product:
 
     Rows whose entries have the same distances from the diagonal form a strip, which stores the
     distances once.  Most rows along beams are in long strips: each row is like the one before, or
-    in space like the row of the same motion of the vertex before.  A run has as many strips.
+    in space like the row of the same component at the vertex before.  A run is a range of rows
+    with one strip, or in space six.
     """
 
     def __init__(self, A: Csr) -> None:

@@ -329,8 +329,8 @@ class JointHistory(NamedTuple):
         in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2 or 3); N.
         moment: Moment of the joint on b, about the place b; (n+1,), in space along x, y, z,
             (n+1, 3); N m.  If the places share their rotation, the moment is unknown: NaN.  In
-            energy-momentum schemes it is a mean of the step: in the plane it does the work of the
-            step on the change of the rotation, in space it is that of its vectors.
+            energy-momentum schemes it is a mean of the step.  In the plane its work on the change
+            of the rotation is that of the step; in space its impulse is that of the step.
     """
 
     motion: Array

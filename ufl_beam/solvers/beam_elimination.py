@@ -56,7 +56,7 @@ def _interior_vertices(
         successive = (np.diff(dofs, axis=1) == 1).all(axis=1)
         return np.asarray((counts[dofs] == number).all(axis=1) & successive)
 
-    inside &= has(3 * n, end[:-1])  # those of the vertex and of its two neighbours
+    inside &= has(3 * n, end[:-1])  # columns of the vertex and of its neighbours
     is_first = np.zeros(len(inside), dtype=bool)
     is_first[np.unique(end[:-1, 0], return_index=True)[1]] = True
     inside &= is_first

@@ -331,8 +331,10 @@ static void eliminate_in_plane(const chains *c, const double *b)
 typedef double octet __attribute__((vector_size(64), may_alias));
 typedef int64_t eight __attribute__((vector_size(64), may_alias));
 
-/* A chain during elimination. Rows of the vertex: pivot block, coupling to the next vertex and right-hand side, coupling to
- * the left end. Then modified rows of the next vertex and of the left end; those of an end with its right-hand side. */
+/* A chain during elimination. pivot, after, to: rows of the vertex in the columns of the vertex, of the next vertex, of the
+ * left end. next, next_to: modified rows of the next vertex in its own columns and those of the left end. from, left:
+ * modified rows of the left end in the columns of the vertex and its own. Column 6 of after, next and from is the
+ * right-hand side. */
 typedef struct {
   int chain, vertex, last;
   octet pivot[6], after[6], to[6], next[6], next_to[6], from[6], left[6];

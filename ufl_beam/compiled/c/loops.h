@@ -52,9 +52,6 @@ struct cells {
  * at extrapolated strains; exact: later forces are forces at the iterate, not predicted; stale: whether a tangent has
  * been computed since the prediction; to: the configuration to which the tangent has predicted a change, in space, if
  * it is not the iterate; in_space: whether cells have motions to it. */
-/* Whether a first change that is very long makes a tangent singular, see goes_astray of newton.c. */
-enum doubt { CERTAIN, DOUBTS, DOUBTED };
-
 typedef struct { int32_t begins, exact, stale, in_space; const double *to; } predicted_forces;
 
 /* Some entries of a vector, or all of them. */
@@ -64,8 +61,8 @@ typedef struct {
   const double *values;
 } vector;
 
-/* A constant matrix, stored by runs of rows. In a run, the entries of each row have the same distances from the diagonal as
- * those of the row `period` before. These rows form a strip; each run has `period` strips in turn, some perhaps empty. */
+/* A constant matrix, stored by runs of rows. In a run, each row has the distances from the diagonal of the row `period`
+ * rows before. Rows with equal distances form a strip. A run has `period` strips; a short run has empty ones. */
 typedef struct {
   int runs, period;
   const int32_t *first;        /* first row of each run, then the number of rows */
@@ -427,6 +424,9 @@ typedef struct {
 typedef void (phase)(void *self, const time_step *step, const double *q1, const double *s);
 typedef struct { phase *run; void *self; } phase_call;
 typedef struct { int number; const phase_call *call; } phases;
+
+/* Whether a first change that is very long makes a tangent singular, see goes_astray of newton.c. */
+enum doubt { CERTAIN, DOUBTS, DOUBTED };
 
 /* The equation of a step and the state of its solution. Unknowns and residuals are in the axes of
  * supports. */
