@@ -497,8 +497,8 @@ def linear_forces_in_space(
 
     The state has the rotations ``turns``, and the section forces ``given`` in the middle of cells
     (num_cells, 6); without ``given`` they follow from elastic strains.  The function computes
-    changes of the section forces at the start, in the middle and at the end of cells, with inertial forces on their nodes,
-    in axes of the sections of the state; (num_cells, 3, 6).
+    changes of the section forces at the start, in the middle and at the end of cells, with inertial
+    forces on their nodes, in axes of the sections of the state; (num_cells, 3, 6).
     """
     fields, fractions = Fields(Subdomain(numbering, MPI.COMM_SELF)), np.array([0.0, 0.5, 1.0])
     axes, stiffness = cell_axes(fields), fields.section_values(*STIFFNESS_IN_SPACE)
