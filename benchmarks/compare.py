@@ -23,7 +23,7 @@ HERE = Path(__file__).resolve().parents[1]
 TITLES = "case", "scene", "cells", "processes", "variant"
 """Fields of a record that say what was measured."""
 
-TIMES = "us_per", "ms_per", "us_median"
+TIMES = "us_per", "ms_per", "us_median", "scene_ms", "building_ms"
 """Beginnings of the names of times in a record."""
 
 
