@@ -183,8 +183,9 @@ class Block(LoadTerm):
         after = width - modes - len(from_)
         self._w: Array = np.zeros((batches := -(-n // BATCH), width, BATCH))
         self._numbers = self._w[:, after - numbers : after]
+        lanes = np.minimum(np.arange(batches * BATCH), n - 1).reshape(batches, BATCH)
         for k, number in enumerate(elements.numbers):  # one by one, as all may be large
-            self._numbers[:, k] = in_batches(np.asarray(number).reshape(n, 1), BATCH)[:, 0]
+            self._numbers[:, k] = np.asarray(number).ravel()[lanes]
         self._states = np.zeros((batches, states, BATCH))
         self.state = {z: self._states[:, k] for k, z in enumerate(statement.state)}
         inserted = statement.inserts

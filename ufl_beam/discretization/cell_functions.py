@@ -254,7 +254,8 @@ def _momentum(degree: int, lumped: bool) -> CellFunction:
 
 def _of_mass(fields: Fields) -> tuple[CellFunction, list[Array]]:
     mesh = fields.subdomain.numbering.mesh
-    numbers = [axes(fields)[0], *fields.section_values("rhoA", "rhoI").T]
+    start, end = fields.coordinates().transpose(1, 2, 0)
+    numbers = [np.hypot(*(end - start)), *fields.section_values("rhoA", "rhoI").T]
     return _momentum(mesh.degree, mesh.lumped), numbers
 
 

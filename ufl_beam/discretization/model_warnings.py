@@ -140,6 +140,8 @@ def _touching(numbering: DofNumbering) -> Index:
     """
     first = numbering.first_vertices
     end, touched, gap = _contacts(numbering.points[: first[-1]], first)
+    if not len(end):
+        return np.empty((0, 2), dtype=np.int64)
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     group = _groups(numbering)[: first[-1]]
     joined = group[end] == group[touched]

@@ -261,7 +261,9 @@ def enclosing_diameter(points: Array) -> float:
             first, *others = points[list(through)]
             ways = np.array(others) - first
             # The centre is equidistant from all points, in least squares if they are collinear.
-            middle = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
+            middle = first + ways[0] / 2
+            if len(ways) > 1:
+                middle = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
             reach = float(lengths(points[few] - middle).max())
             circles.append((reach, list(through), middle))
         larger, chosen, center = min(circles, key=lambda circle: circle[0])

@@ -111,13 +111,16 @@ class Record:
         for name, word, default, check in _checks(type(self)):  # type: ignore[arg-type]
             value = getattr(self, name)
             if value is not default:
-                owner = type(self).__name__ if name in NAMING else self._label()
                 try:
-                    checked = check(value, what=f"{owner}: {word}")
-                except ArgumentError as error:
-                    if isinstance(error, self._refused):
-                        raise
-                    raise self._refused(str(error)) from None
+                    checked = check(value, what=word)
+                except ArgumentError:  # again with the name of the record, which takes time
+                    owner = type(self).__name__ if name in NAMING else self._label()
+                    try:
+                        checked = check(value, what=f"{owner}: {word}")
+                    except ArgumentError as error:
+                        if isinstance(error, self._refused):
+                            raise
+                        raise self._refused(str(error)) from None
                 object.__setattr__(self, name, value if checked is None else checked)
 
     def _label(self) -> str:

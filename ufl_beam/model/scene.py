@@ -27,7 +27,6 @@ from ufl_beam.model.bodies import (
     PointMass,
     Representatives,
     Velocity,
-    base_of,
     merged,
     node,
 )
@@ -193,13 +192,19 @@ class Scene(Record, Rich):
     @cached_property
     def in_space(self) -> bool:
         """True if points of the scene have three coordinates."""
-        points = (*(b.ends[0] for b in self.beams), *(b.center for b in self.bodies))
-        return any(len(point) == 3 for point in points)
+        return 3 in self._dimensions
+
+    @property
+    def _dimensions(self) -> list[int]:
+        """Numbers of coordinates of the points of the parts."""
+        return [*(len(b.ends[0]) for b in self.beams), *(len(b.center) for b in self.bodies)]
 
     def _require_one_dimension(self) -> None:
         """Raise unless all vectors have two components, or three in a scene of known kinds."""
         d, of = (3, "in space") if self.in_space else (2, "in the plane")
-        for part in (x for x in self.parts if len(base_of(x).point) != d):
+        for part, own in zip(self.parts, self._dimensions, strict=True):
+            if own == d:
+                continue
             raise ModelError(
                 f"{part.name}: its points have two coordinates, but other parts are in space; give "
                 "all points three coordinates"
@@ -208,9 +213,9 @@ class Scene(Record, Rich):
         sizes |= dict.fromkeys(("moment", "angular", "rate"), 2 * d - 3) | {"normal": d - 1}
         records: list[Record] = [*self.loads, *self.initial]
         for record in records:
-            for name, wanted in sizes.items():
-                vector = getattr(record, name, None)
-                if vector is not None and np.any(vector) and np.size(vector) != wanted:
+            for name, vector in vars(record).items():
+                wanted, size = sizes.get(name), len(vector) if isinstance(vector, tuple) else 1
+                if wanted not in (None, size) and vector is not None and np.any(vector):
                     raise ModelError(
                         f"{record._label()}: {name} = {vector} must have {wanted} components, "
                         f"because the scene is {of}"
@@ -405,18 +410,19 @@ class Scene(Record, Rich):
         return merged([*self.shared_by_joints, *hinges])
 
     def _require_single_supports(self) -> None:
-        holders = {self.unknown(GROUND, c): "the ground" for c in range(6 if self.in_space else 3)}
+        components = range(6 if self.in_space else 3)
+        holders: dict[Unknown, Any] = {self.unknown(GROUND, c): "the ground" for c in components}
         for support in self.supports:
             # A support with rotated axes involves all components that it rotates.
-            components = {*support.held, *(c for *pair, _ in support.turns for c in pair)}
-            for component in sorted(components):
+            involved = {*support.held, *(c for *pair, _ in support.turns for c in pair)}
+            for component in sorted(involved):
                 held = self.unknown(node(support.place), component)
                 if held in holders:
                     raise ModelError(
                         f"supports in conflict: {holders[held]} and {support} both hold "
                         f"{support.names[component]}; remove one"
                     )
-                holders[held] = str(support)
+                holders[held] = support
 
 
 IN_SPACE = (

@@ -445,10 +445,9 @@ def _bar(shape: Shape, factor: float, torsion: float, material: dict[str, Any]) 
 def _torsion_of_rectangle(b: float, h: float) -> float:
     """Return a b³ (1/3 - 64 b/(π⁵ a) Σ tanh(n π a/(2 b))/n⁵), n odd, with the sides a >= b; m⁴."""
     a, b = max(b, h), min(b, h)
-    n = np.arange(1, 12, 2)
-    from_one = ((1 - np.tanh(n * np.pi * a / (2 * b))) / n**5).sum()
+    from_one = sum((1 - math.tanh(n * math.pi * a / (2 * b))) / n**5 for n in range(1, 12, 2))
     series = 31 / 32 * scipy.special.zeta(5.0) - from_one
-    return float(a * b**3 * (1 / 3 - 64 * b / (np.pi**5 * a) * series))
+    return float(a * b**3 * (1 / 3 - 64 * b / (math.pi**5 * a) * series))
 
 
 def require_positive(owner: str, **sizes: float) -> None:

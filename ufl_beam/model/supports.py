@@ -108,7 +108,7 @@ class Support(Bearing, Record, ABC):
         """See the base class."""
         return self.held.values()
 
-    @property
+    @cached_property
     @abstractmethod
     def held(self) -> dict[int, TimeFunction]:
         """Functions of time of the prescribed components."""
@@ -119,7 +119,7 @@ class Support(Bearing, Record, ABC):
         if not self.held:
             names = "u, v, psi" if self.displacements == 2 else "u, v, w, axis"
             raise ModelError(f"{self} holds nothing; give at least one of {names}")
-        for component, value in self.held.items():
+        for component, value in self.moving.items():
             require_time_function(value, f"{self}, {self.names[component]}")
 
     def _require_directions(self) -> None:
@@ -154,7 +154,7 @@ class Clamped(Support):
         [0, 1, 2]
     """
 
-    @property
+    @cached_property
     def held(self) -> dict[int, TimeFunction]:
         """All components, fixed at zero."""
         return dict.fromkeys(range(3 * self.displacements - 3), still)
@@ -169,7 +169,7 @@ class Pinned(Support):
         [0, 1]
     """
 
-    @property
+    @cached_property
     def held(self) -> dict[int, TimeFunction]:
         """The displacement, fixed at zero."""
         return dict.fromkeys(range(self.displacements), still)
@@ -198,7 +198,7 @@ class Roller(Support):
     def _require_directions(self) -> None:
         _require_components(self, "along", Roller.along)
 
-    @property
+    @cached_property
     def held(self) -> dict[int, TimeFunction]:
         """Displacement across ``along``, fixed at zero."""
         free = np.flatnonzero(self.along)
