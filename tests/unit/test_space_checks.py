@@ -171,7 +171,7 @@ def test_redundant_joints_are_refused_by_name():
         assert "idle" not in words
         with pytest.raises(ub.ModelError, match="contradict"):
             ub.plot(four_bars(kinds))
-    assert run(four_bars("RRSC")).energy.worst < 1e-12
+    assert run(four_bars("RRSC")).energy.worst < 1e-10  # the tolerance of Newton's method
 
 
 def test_constraints_that_repeat_during_a_run_are_named(monkeypatch):

@@ -108,7 +108,7 @@ class Support(Bearing, Record, ABC):
         """See the base class."""
         return self.held.values()
 
-    @cached_property
+    @property
     @abstractmethod
     def held(self) -> dict[int, TimeFunction]:
         """Functions of time of the prescribed components."""

@@ -188,6 +188,7 @@ class StepEquation:
             return match[1]
 
         product, cells = pop("add_step_tangent"), pop("add_cells")
+        vectors = [load.vector for load in self.loads]
         law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
         demanding = subdomain.largest(float(bool(law_residuals)))
         predicted = [x.prediction for x in self.cells if x.prediction is not None]
@@ -198,6 +199,7 @@ class StepEquation:
             force=ffi.new("call[]", [force for force, _ in loops]),
             stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
             product=product, cells=cells, indptr=A.indptr, tangent=A.data,
+            load_vectors=len(vectors), load=ffi.new("vector *[]", vectors),
             zeros=len(zero), zero=zero, pivot=pivot,
             held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
             reactions=supports.reactions, pivots=supports.pivots,

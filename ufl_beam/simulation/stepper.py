@@ -239,7 +239,6 @@ class Stepper(StateView):
         self.solver = solver = Solver(subdomain, equation, newton, least)
         rotations = subdomain.rotations
         half_tangents = with_half_tangents(scheme, subdomain.plane_rotations)
-        loads = [load.vector for load in equation.loads]
         multipliers = subdomain.multipliers.astype(np.int32)
         opens = [phase.opens for phase in phases if phase.opens is not None]
         places = ffi.new("element_block *[]", opens)
@@ -257,7 +256,6 @@ class Stepper(StateView):
             rotations=len(rotations), rotation=rotations, axes=3 if self.scene.in_space else 1,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
-            loads=len(loads), load=ffi.new("vector *[]", loads),
             supports=equation.supports.in_c(equation.callbacks),
             states=len(ledger.state), state=ledger.state.amounts, cell_forces=self.cell_forces.c,
             opens=int(subdomain.largest(float(bool(opens)))), places=len(opens), place=places,

@@ -451,6 +451,8 @@ typedef struct {
   const double *idle_stiffness;
 
   double rtol, loads; /* tolerance; size of the loads */
+  int load_vectors;
+  const vector *const *load; /* forces of loads */
   const chains *elimination;
   const fronts *fronts;  /* factors of the reduced system; or none: then PETSc factorizes it */
   void *left, *factors, *left_f, *left_x; /* in PETSc: reduced system, its factors, two vectors */
@@ -469,7 +471,7 @@ typedef struct {
   int32_t *switched;    /* set if a row of a connector has changed between motion and force since the
                          * tangent */
   double last, best;                  /* residual of the previous iterate; least residual so far */
-  int near, slow, patience; /* near: whether the next iteration keeps the tangent */
+  int near, slow, patience; /* near: iterations that will keep the tangent */
   int iterations, reason, total;      /* of the latest solution; total: of all */
   int careful;           /* whether changes are scaled by a line search */
   int monitored;         /* whether options of PETSc or monitors ask for PETSc's own method */
@@ -835,8 +837,6 @@ typedef struct {
   int admissions, checks_laws; /* checks of laws; whether any process has checks */
   const admission_call *admission;
   static_path *path;  /* in statics */
-  int loads;
-  const vector *const *load; /* their forces */
   moving_supports *supports;
   int opens, places;  /* opens: whether places may open, on any process */
   const element_block *const *place; /* blocks whose points or elements open beyond a limit */

@@ -214,11 +214,7 @@ static int solve(time_loop *m, int hold)
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
   if (e->rotations) memcpy(e->base, m->q, m->size * sizeof *e->base);
-  e->loads = 0;
-  for (int k = 0; k < m->loads; ++k) {
-    const vector *l = m->load[k];
-    e->loads += over_processes(e, HYPOT, norm(l->size, l->dof, e->weight, l->values));
-  }
+  find_size_of_loads(e);
   if (!m->opens) return find_equilibrium(e, m->guess) > 0;
   int opened = 0;
   if (hold) {
