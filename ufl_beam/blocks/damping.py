@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Statements of resultants from changes of strain in a step: viscous and numerical damping."""
+"""Viscous and numerical damping of beams: resultants from changes of strain in a step."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Step control: equal and adaptive steps from the beginning of a run to its end."""
+"""Equal steps, which steps.c divides if they fail, and adaptive steps, divided here."""
 
 from __future__ import annotations
 

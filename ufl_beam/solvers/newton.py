@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Equilibrium of a step by Newton's method in newton.c, as a solver of PETSc.
 
-The tolerances of its convergence test are dimensionless.
+Its convergence test is ``test_convergence`` there, with dimensionless tolerances.
 """
 
 from __future__ import annotations

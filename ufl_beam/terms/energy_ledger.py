@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Energy ledger: energy in the scene, work supplied, and losses."""
+"""Energy ledger of a scene; the statements of blocks/, terms and C write its entries."""
 
 from __future__ import annotations
 
