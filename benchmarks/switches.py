@@ -49,7 +49,7 @@ class AtVelocity(Prediction):
         self.c.second = c_library.ffi.NULL
 
 
-KEEPS = "e->near = !kept &&"
+KEEPS = "if (iteration > !e->product && !kept"
 """Where newton.c lets the tangent of the last iterate do."""
 
 
@@ -57,7 +57,7 @@ KEEPS = "e->near = !kept &&"
 def without_kept_tangents():
     """Newton's method of newton.c, compiled to make a tangent in every iteration; its address."""
     assert c_library._SOURCE.count(KEEPS) == 1
-    source = c_library._SOURCE.replace(KEEPS, "e->near = 0 && !kept &&")
+    source = c_library._SOURCE.replace(KEEPS, KEEPS.replace("(", "(0 && ", 1))
     declarations = c_library.DECLARATIONS + c_library._CALLBACKS
     other = compiled(
         "ufl_beam_tangents",
