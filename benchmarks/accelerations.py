@@ -92,12 +92,11 @@ ACCELERATIONS = {
         ),
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),
-    "tangent kept in the last iteration": Acceleration(
-        "An iteration reuses the previous tangent if the residual is expected to fall far below "
-        "the tolerance; the next iteration then has a new tangent. Without it, every iteration "
-        "assembles and factors a tangent.",
+    "tangent kept in the last iterations": Acceleration(
+        "One or two iterations reuse the previous tangent if the residual is expected to fall far "
+        "below the tolerance in them. Without it, every iteration assembles and factors a tangent.",
         by.SHIPPED, by.TANGENTS,
-        ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE",),
+        ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE|MARGIN|\\bfactor\\b",),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
 }  # fmt: skip
