@@ -153,7 +153,7 @@ WITHOUT: set[str] = set()
 
 MODULES = (
     "model.", "mechanics.", "simulation.step_lengths", "analysis.path_controls",
-    "structures.concrete_laws", "structures.steel_laws", "structures.hinge_laws",
+    "structures.concrete_laws", "structures.hinge_laws",
     "structures.hysteresis_laws", "structures.ground_motion",
 )  # fmt: skip
 

@@ -14,9 +14,8 @@ from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization import cell_functions, compiled_forms
-from ufl_beam.discretization.beam_forms import elastic_form, mass_form
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
+from ufl_beam.discretization.function_spaces import DolfinxFields, Fields, elastic_form, mass_form
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import VERSION, fem
 

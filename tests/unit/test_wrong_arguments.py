@@ -494,7 +494,7 @@ WORDS = {
 """Words in the place of a parameter's name."""
 
 OF_STRUCTURES = {
-    "concrete_laws", "ground_motion", "hinge_laws", "hysteresis_laws", "steel_laws",
+    "concrete_laws", "ground_motion", "hinge_laws", "hysteresis_laws",
     "sectionproperties", "steel_sections",
 }  # fmt: skip
 """Modules of structures with parts of models; steel sections are named by their function."""

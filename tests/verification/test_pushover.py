@@ -18,7 +18,7 @@ from scipy.integrate import trapezoid
 
 import ufl_beam as ub
 import ufl_beam.structures as st
-from ufl_beam.structures.pushover_result import bilinear
+from ufl_beam.structures.pushover import bilinear
 
 EI, H, L, M_P, MASS, P = 2e7, 4.0, 6.0, 148e3, 10e3, 200e3  # N m², m, m, N m, kg, N
 RIGID = 1e5  # stiffness of the girder over the stiffness of columns: an error of EI/RIGID

@@ -165,7 +165,6 @@ class Stiffness:
         self.flow = self._spread(-self._solve(self._forces))
 
     def _solve(self, b: Array) -> Array:
-        """Solve with the tangent for one right-hand side."""
         n = self._num_motions
         forces = b[n:] / self._β
         scaled = np.where(np.isinf(self._β), self._row_scale * b[n:], 0.0)

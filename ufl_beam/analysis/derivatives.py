@@ -289,18 +289,12 @@ class Case:
                 starts = start._ends[p] if fraction == MODEL_STEP else start._runs(p, fraction)
             yield from map(self._begin, scenes, starts)
 
-    def positions(self, name: str, fraction: float) -> Array:
-        """Return the changes of a parameter in the scenes of :meth:`scenes`."""
-        return self._step(name, fraction) * np.array(self._stencil(name))
-
-    def weights(self, name: str, fraction: float) -> Array:
-        """Return the weights of the scenes of :meth:`scenes` in a derivative."""
-        return np.array(STENCILS[self._stencil(name)]) / self._step(name, fraction)
-
-    def _stencil(self, name: str) -> tuple[int, ...]:
+    def differences(self, name: str, fraction: float) -> tuple[Array, Array]:
+        """Return changes of a parameter in :meth:`scenes`, and their weights in a derivative."""
         if name not in self._stencils:
             self.scenes(name, MODEL_STEP)
-        return self._stencils[name]
+        stencil, step = self._stencils[name], self._step(name, fraction)
+        return step * np.array(stencil), np.array(STENCILS[stencil]) / step
 
     def run(
         self, t1: float, dt: float, start: Derivatives | None = None, *, progress: bool = False
@@ -332,10 +326,8 @@ class Case:
             elif (found := self._differenced(run, t1)) is not None:
                 return found
             else:
-                scenes = [
-                    [NeighbouringScene(run, scene) for scene in self.scenes(name, MODEL_STEP)]
-                    for name in names
-                ]
+                beside = partial(NeighbouringScene, run)
+                scenes = [[*map(beside, self.scenes(x, MODEL_STEP))] for x in names]
         for name, some in zip(names, scenes, strict=True):
             if not all(alike(run, other) for other in some):
                 raise ArgumentError(
@@ -343,7 +335,7 @@ class Case:
                     "that the run has no derivative; keep beams, cells and attached points on the "
                     "same vertices"
                 )
-        return Beside(scenes, np.array([self.weights(name, MODEL_STEP) for name in names]))
+        return Beside(scenes, np.array([self.differences(x, MODEL_STEP)[1] for x in names]))
 
     def _differenced(self, run: Simulation, t1: float) -> Beside | None:
         """Return derivatives of all numbers, or a scene for each parameter if all are linear.
@@ -432,7 +424,7 @@ class StepDerivatives:
             self.states += own.states
             self._alive.append(own)
             scene.enters |= own.enters
-        self._neighbours = scene
+        self.numbers_enter = scene.enters
         in_c = [(data, *functions(kind)[:4]) for kind, data in self.terms]
         constrained = len(equation.supports.dofs)
         self.q, self.v = np.zeros((2, states, P, size))
@@ -468,12 +460,6 @@ class StepDerivatives:
         self.restore(self.states)
         if beside.rows:
             beside.rows.clear()
-
-    def enters(self) -> list[bool]:
-        """Return, after the run, whether a number in it depends on each parameter."""
-        found = (np.any(x, axis=(0, 2)) for x in (self.q, self.v, self.reactions))
-        enters = np.any([self._neighbours.enters, np.isfinite(self._change), *found], axis=0)
-        return [bool(x) for x in enters]
 
     def restore(self, states: list[Array]) -> None:
         """Set the derivatives at the beginning of the run to the :attr:`states` of another one."""
@@ -559,7 +545,10 @@ class Derivatives:
         self._substeps = steps.substeps()
         self._constrained_dofs, self.mesh = steps.constrained_dofs, case.mesh
         self.ranges = dict(zip(case.at, steps.ranges(), strict=True))
-        self._enters = dict(zip(case.at, steps.enters(), strict=True))
+        of_motion = (np.any(x, axis=(0, 2)) for x in (steps.q, steps.v, steps.reactions))
+        changes = [x.change for x in self.ranges.values()]
+        enters = np.any([steps.numbers_enter, np.isfinite(changes), *of_motion], axis=0)
+        self._enters = dict(zip(case.at, map(bool, enters), strict=True))
         if start is not None:
             for name, earlier in start.ranges.items():
                 self.ranges[name] = min(earlier, self.ranges[name], key=lambda x: x.change)
@@ -610,7 +599,7 @@ class Derivatives:
             runs = (self._runs(p, fraction) for p, fraction in enumerate(fractions))
             changes = [self._differences(quantity, reference, some) for some in runs]
         found = [
-            np.tensordot(self._case.weights(name, fraction), row, axes=1)
+            np.tensordot(self._case.differences(name, fraction)[1], row, axes=1)
             for name, fraction, row in zip(self.at, fractions, changes, strict=True)
         ]
         return np.stack(found, axis=-1)
@@ -681,7 +670,8 @@ class Derivatives:
         for p, name in enumerate(self.at):
             scenes = self._case.scenes(name, QUANTITY_STEP)
             made = [DofNumbering(scene, mesh_of(None, self._case.mesh)) for scene in scenes]
-            pairs = zip(made, self._case.positions(name, QUANTITY_STEP), strict=True)
+            changes, _ = self._case.differences(name, QUANTITY_STEP)
+            pairs = zip(made, changes, strict=True)
             found.append([MotionOnly.of_states(n, self._states(p, x)) for n, x in pairs])
         return found
 
@@ -708,7 +698,7 @@ class Derivatives:
             first, name, found = self._first(), [*self.at][p], list[Solution]()
             # Simulations begin at the time of the first run
             simulations = first._case.simulations(name, fraction)
-            changes = self._case.positions(name, fraction)
+            changes, _ = self._case.differences(name, fraction)
             for simulation, change in zip(simulations, changes, strict=True):
                 with closing(simulation):
                     found.append(self._repeat(simulation, p, change))
@@ -738,7 +728,7 @@ class Derivatives:
         for p, name in enumerate(self.at):
             ends.append([])
             simulations = self._case.simulations(name, MODEL_STEP)
-            positions = self._case.positions(name, MODEL_STEP)
+            positions, _ = self._case.differences(name, MODEL_STEP)
             for simulation, change in zip(simulations, positions, strict=True):
                 with closing(simulation):
                     if (inertia := simulation.equation.inertia) is not None:

@@ -145,7 +145,8 @@ def gradient(
                 numberings = [
                     DofNumbering(x, run.numbering.mesh) for x in case.scenes(name, MODEL_STEP)
                 ]
-                found[p] += case.weights(name, MODEL_STEP) @ [*map(history.change_in, numberings)]
+                changes = [*map(history.change_in, numberings)]
+                found[p] += case.differences(name, MODEL_STEP)[1] @ changes
         beside.close()
     return history.value, found
 
@@ -239,7 +240,6 @@ class _Adjoint:
         return self.gradient.copy()
 
     def _add(self, n: int, q: tuple[Index, Array], v: tuple[Index, Array]) -> None:
-        """Add the derivatives by a state."""
         for x, (dofs, values) in ((self._q1, q), (self._rates[1], v)):
             x[dofs] += values[n]
 
@@ -294,7 +294,6 @@ class _History:
             ) from None
 
     def _number(self, history: Array) -> float:
-        """Return the number that is made of a history."""
         what = "gradient: reduce, by default the last value,"
         given = f"a history of shape {history.shape}"
         return require_returned(self._reduce(history), what, given, finite=True)

@@ -7,14 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array, vstack
+import numpy.typing as npt
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, vstack
+from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.cells_in_space import velocity_in_space
-from ufl_beam.discretization.dof_numbering import turned, values_at
+from ufl_beam.discretization.dof_numbering import turned, velocity_at
 from ufl_beam.errors import ArgumentError, ArgumentTypeError, shorten
-from ufl_beam.model.bodies import GROUND, AttachmentPoint, BodyPoint, Place, arm, node
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, BodyPoint, Place, node
 from ufl_beam.model.connector_laws import Controller, Guide, PrescribedForce, PrescribedMotion
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -24,6 +26,7 @@ from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.output.section_forces import ForcesAlongCells
 from ufl_beam.output.state_rows import connector_indices, signs_on_second_place
 
+NEGLIGIBLE = 1e-9  # fraction of a motion that constraints allow, below which they hold it
 IMAGINARY = 1e-100  # imaginary change of a configuration; its square vanishes
 SECTION_FORCES = ("N", "V", "M")
 FORCE = ("x", "y", "moment")
@@ -67,22 +70,19 @@ class Inputs:
         requested: Sequence[Any],
         factors: Mapping[int, Any],
     ) -> None:
-        self._small, self._scene, self._factors = small, scene, factors
+        self._small, size = small, small.numbering.size
         self.force_names, self.prescribed_names = list[str](), list[str]()
         self._forces, self.in_cells = list[Array](), list[Array]()
-        size, cells = small.numbering.size, len(small.numbering.cells)
-        self._still = np.zeros((9, cells))
-        columns: dict[str, list[Any]] = {"motions": [], "prescribed": [], "read": []}
-        names, kinds = list[str](), list[bool]()
+        self._motions, self._all = list[tuple[Any, ...]](), list[tuple[str, bool]]()
         for x, components in requested:
-            before = len(self.force_names), len(self.prescribed_names)
-            self._add(x, components, columns)
-            names += [f"{name}" for name in self.force_names[before[0] :]]
-            kinds += [False] * (len(self.force_names) - before[0])
-            more = self.prescribed_names[before[1] :]
-            names += [_accelerated(name) for name in more]
-            kinds += [True] * len(more)
-        self.names, motion = _unique(names), np.array(kinds, dtype=bool)
+            if isinstance(x, Load):
+                self._add_load(x, factors[id(x)])
+            elif isinstance(x, Connector):
+                self._add_connector(x, int(connector_indices(scene, x)[0]))
+            else:
+                self._add_support(x, components)
+        self.names = _unique([name for name, _ in self._all])
+        motion = np.array([is_motion for _, is_motion in self._all])
         self.order: Index = np.where(
             motion, np.cumsum(motion) - 1 + np.sum(~motion), np.cumsum(~motion) - 1
         )
@@ -93,52 +93,51 @@ class Inputs:
         self.condensed[laws] = 0.0
         self.condensed = csr_array(self.condensed)
         self.motions, self.prescribed, read = (
-            csr_array(np.reshape(columns[name], (-1, size)).T) for name in columns
+            csr_array(np.reshape(columns, (-1, size)).T)
+            for columns in zip(*self._motions or [((),) * 3], strict=True)
         )
         self.read = csr_array(read.T)
         self.number_of_motions = self.motions.shape[1]
 
-    def _add(self, x: Any, components: Sequence[int], columns: dict[str, list[Any]]) -> None:
-        scene, size, T = self._scene, self._small.numbering.size, self._small.tangent
-        if isinstance(x, Load):
-            before, before_in_cells = self._small.forces()
-            self._factors[id(x)].change = 1.0
-            after, in_cells = self._small.forces()
-            self._factors[id(x)].change = 0.0
-            self._enter_force(f"factor of {x} [1]", before - after, in_cells - before_in_cells)
-        elif isinstance(x, Connector):
-            row = int(self._small.numbering.multipliers[connector_indices(scene, x)[0]])
-            if not isinstance(x.law, PrescribedMotion):
-                force = np.zeros(size)
-                force[row] = -T[row, row]  # λ resists the growth of the motion
-                unit = "N m" if x.is_rotation else "N"
-                self._enter_force(f"force of {x} [{unit}]", force, self._still)
-                return
-            columns["motions"].append(np.zeros(size))
-            columns["prescribed"].append(np.eye(1, size, row)[0])
-            columns["read"].append(T[[row]].toarray()[0])
-            unit = "rad" if x.is_rotation else "m"
-            self.prescribed_names.append(f"motion of {x} [{unit}]")
-        else:
-            for c in components:
-                axis = self._small._axes[:, [self._small.numbering.node(x.place)[c]]].toarray()
-                columns["motions"].append(axis[:, 0])
-                columns["prescribed"].append(np.zeros(size))
-                columns["read"].append(axis[:, 0])
-                unit = "m" if c < x.displacements else "rad"
-                self.prescribed_names.append(f"{x.names[c]} of {x} [{unit}]")
+    def _add_load(self, load: Load, factor: Any) -> None:
+        before, before_in_cells = self._small.forces()
+        factor.change = 1.0
+        after, in_cells = self._small.forces()
+        factor.change = 0.0
+        self._enter_force(f"factor of {load} [1]", before - after, in_cells - before_in_cells)
+
+    def _add_connector(self, connector: Connector, index: int) -> None:
+        small, still = self._small, np.zeros(self._small.numbering.size)
+        T, row = small.tangent, int(small.numbering.multipliers[index])
+        unit = np.eye(1, len(still), row)[0]
+        if isinstance(connector.law, PrescribedMotion):
+            name = f"motion of {connector} [{'rad' if connector.is_rotation else 'm'}]"
+            self._enter_motion(name, still, unit, T[[row]].toarray()[0])
+        else:  # λ resists the growth of the motion
+            name = f"force of {connector} [{'N m' if connector.is_rotation else 'N'}]"
+            in_cells = np.zeros((9, len(small.numbering.cells)))
+            self._enter_force(name, -T[row, row] * unit, in_cells)
+
+    def _add_support(self, support: Support, components: Sequence[int]) -> None:
+        for c in components:
+            dof = self._small.numbering.node(support.place)[c]
+            axis = self._small._axes[:, [dof]].toarray()[:, 0]
+            unit = "m" if c < support.displacements else "rad"
+            name = f"{support.names[c]} of {support} [{unit}]"
+            self._enter_motion(name, axis, np.zeros(len(axis)), axis)
 
     def _enter_force(self, name: str, force: Array, in_cells: Array) -> None:
         self.force_names.append(name)
+        self._all.append((name, False))
         self._forces.append(force)
         self.in_cells.append(in_cells)
 
-
-def _accelerated(name: str) -> str:
-    """Return the name of the acceleration of a motion, as in tables of :class:`History`."""
-    motion, _, unit = name.removesuffix("]").rpartition(" [")
-    first, _, rest = motion.partition(" ")
-    return f"d2{first}/dt2 {rest} [{unit}/s2]"
+    def _enter_motion(self, name: str, motion: Array, prescribed: Array, read: Array) -> None:
+        self.prescribed_names.append(name)
+        words, _, unit = name.removesuffix("]").rpartition(" [")
+        first, _, rest = words.partition(" ")
+        self._all.append((f"d2{first}/dt2 {rest} [{unit}/s2]", True))  # as in tables of History
+        self._motions.append((motion, prescribed, read))
 
 
 def checked_inputs(scene: Scene, requested: Sequence[Any]) -> list[tuple[Any, list[int]]]:
@@ -258,28 +257,19 @@ class Outputs:
 
     def _place_rows(self, place: AttachmentPoint) -> csr_array:
         """Return rows of (u, v, ψ) of a place, in space of (u, v, w); (3, size)."""
-        numbering, turns = self._small.numbering, self._small.turns
-        rows = np.zeros((3, numbering.size))
-        if isinstance(place, BodyPoint) and node(place) is GROUND:
-            return csr_array(rows)
-        if self._scene.in_space:
-            if isinstance(place, BodyPoint):
-                dofs = numbering.node(place)
-            else:
-                dofs = numbering.dofs[numbering.weights(place)[0]]
-            each = (np.unique(dofs)[:, None] == np.arange(numbering.size)).astype(float)
-            moved = velocity_in_space(numbering, place, each, np.array([turns] * len(each)))
-            return csr_array(moved[:, :3].T @ each)
-        if isinstance(place, BodyPoint):
-            dofs = numbering.node(place)
-            x, y = turned(arm(place), self._small.q[dofs[2:]])[0]
-            rows[[0, 1, 2], dofs] = 1.0
-            rows[[0, 1], dofs[2]] = -y, x
+        small, numbering = self._small, self._small.numbering
+        if isinstance(place, Place):
+            dofs = numbering.dofs[numbering.weights(place)[0]]
+        elif node(place) is GROUND:
+            return csr_array((3, numbering.size))
         else:
-            nodes, weights = numbering.weights(place)
-            for at, weight in zip(nodes, weights, strict=True):
-                rows[[0, 1, 2], numbering.dofs[at]] += weight
-        return csr_array(rows)
+            dofs = numbering.node(place)
+        each = (np.unique(dofs)[:, None] == np.arange(numbering.size)).astype(float)
+        if self._scene.in_space:
+            moved = velocity_in_space(numbering, place, each, np.array([small.turns] * len(each)))
+        else:
+            moved = velocity_at(numbering, place, np.array([small.q] * len(each)), each)
+        return csr_array(moved[:, :3].T @ each)
 
     def _add_motion(self, x: Any, components: Sequence[int], kind: str) -> None:
         order = ("displacement", "velocity", "acceleration").index(kind)
@@ -323,7 +313,8 @@ class Outputs:
             T = small.tangent[:, [λ]].toarray()[:, 0]
             # Direction in which b moves if the motion grows, and its change with the configuration
             if holder.stretches:
-                between = _position(small, holder.b) - _position(small, holder.a)
+                position = small._simulation.now.position
+                between = position(holder.b)[0] - position(holder.a)[0]
                 length = float(np.linalg.norm(between))
                 d = between / length
                 at = self._place_rows(holder.b) - self._place_rows(holder.a)
@@ -384,21 +375,6 @@ class Outputs:
             self._enter(name, [matrix[[c]] for matrix in matrices], direct[c])
 
 
-def _position(small: Linearization, place: AttachmentPoint) -> Array:
-    """Return the position of a place in the state; (2,); m."""
-    if isinstance(place, BodyPoint) and node(place) is not GROUND:
-        (moved,) = values_at(small.numbering, place, small.q[None])
-        (offset,) = turned(arm(place), moved[2:])
-        return np.asarray(place.point - np.array(arm(place)) + offset + moved[:2])
-    (moved,) = values_at(small.numbering, place, small.q[None])
-    return np.asarray(place.point + moved[:2])
-
-
-def checked_outputs(scene: Scene, wanted: Sequence[Any]) -> list[tuple[str, Any, list[int]]]:
-    """Return kinds, objects and indices of the components of outputs, or raise."""
-    return [_checked_output(scene, x, f"linearize: outputs[{n}]") for n, x in enumerate(wanted)]
-
-
 OBJECTS: Mapping[str, type] = {
     "section_forces_at": Place, "connector": Connector, "joint": Joint, "reaction": Support,
 }  # fmt: skip
@@ -409,7 +385,8 @@ def _kinds(scene: Scene) -> Mapping[str, tuple[str, ...]]:
     return IN_SPACE if scene.in_space else KINDS
 
 
-def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, list[int]]:
+def checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, list[int]]:
+    """Return kind, object and indices of the components of an output, or raise."""
     kinds = _kinds(scene)
     if not isinstance(output, tuple) or len(output) not in (2, 3) or output[0] not in [*kinds]:
         raise ArgumentTypeError(
@@ -434,7 +411,11 @@ def _checked_output(scene: Scene, output: Any, what: str) -> tuple[str, Any, lis
     elif isinstance(x, Connector | Joint):
         _require(what, connector_indices, scene, x)
     if isinstance(x, Joint):
-        _require_known_force(x, rest, what)
+        _require(what, signs_on_second_place, x)
+        if any(isinstance(holder.law, Guide) for holder in x.holders):
+            raise ArgumentError(f"{what}: {x}: the force of a guide is no output")
+        if rest and rest[0] == "moment" and 2 in x.shared:
+            raise ArgumentError(f"{what}: {x} shares its rotation; its moment is not known")
     return kind, x, [names.index(rest[0])] if rest else [*range(len(names))]
 
 
@@ -446,10 +427,42 @@ def _require(what: str, check: Callable[..., object], *arguments: Any) -> None:
         raise ArgumentError(f"{what}: {error}") from None
 
 
-def _require_known_force(joint: Joint, rest: Sequence[str], what: str) -> None:
-    """Raise unless the force of a joint on its second place is known."""
-    _require(what, signs_on_second_place, joint)
-    if any(isinstance(holder.law, Guide) for holder in joint.holders):
-        raise ArgumentError(f"{what}: {joint}: the force of a guide is no output")
-    if rest and rest[0] == "moment" and 2 in joint.shared:
-        raise ArgumentError(f"{what}: {joint} shares its rotation; its moment is not known")
+def require_free(small: Linearization, inputs: Inputs, outputs: Outputs) -> None:
+    """Raise if constraints hold an output, or the motions on which an input works.
+
+    Prescribed motions that are inputs do not hold outputs.
+    """
+    forces, motions = inputs.condensed.toarray(), outputs.motions.T.toarray()
+    moved = inputs.prescribed[small.left].tocsr()[np.flatnonzero(small._constraint_rows)]
+    fixed = np.ones(moved.shape[0], dtype=bool) if not moved.nnz else abs(moved).sum(axis=1) == 0
+    by_supports = abs(outputs.motions @ inputs.motions).sum(axis=1) > 0
+    free = _allowed(small, motions, fixed) | by_supports
+    for name in [x for x, able in zip(outputs.motion_names, free, strict=True) if not able][:1]:
+        raise ArgumentError(
+            f"linearize: outputs: {name}: supports or constraints hold this motion, so that it "
+            "does not change; choose another place, or a component that can change"
+        )
+    works = _allowed(small, forces, fixed | True)
+    for name in [x for x, able in zip(inputs.force_names, works, strict=True) if not able][:1]:
+        raise ArgumentError(
+            f"linearize: inputs: {name}: supports or constraints hold the motion on which it "
+            "works, so that it moves nothing; choose another place or direction"
+        )
+
+
+def _allowed(
+    small: Linearization, vectors: Array, chosen: npt.NDArray[np.bool_]
+) -> npt.NDArray[np.bool_]:
+    """Return which columns, rows of motions or forces, the ``chosen`` constraints leave free.
+
+    A column is free if its part in the motions that the constraints allow is not round-off.
+    """
+    y, μ = np.flatnonzero(~small._constraint_rows), np.flatnonzero(small._constraint_rows)[chosen]
+    whole = np.linalg.norm(small.lengths[:, None] * vectors, axis=0)
+    W = small.lengths[small.left[y], None] * (small._Z.T @ vectors)[y]
+    if len(μ) and W.size:
+        G = csr_array(small.K)[μ][:, y] @ diags_array(small.lengths[small.left[y]])
+        G = diags_array(1 / np.sqrt((G * G).sum(axis=1))) @ G
+        system = block_array([[eye_array(len(y)), G.T], [G, None]])
+        W = splu(csc_array(system)).solve(np.vstack([W, np.zeros((len(μ), W.shape[1]))]))[: len(y)]
+    return np.asarray(np.linalg.norm(W, axis=0) > NEGLIGIBLE * whole)

@@ -15,18 +15,13 @@ from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_arr
 from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linear_inputs_and_outputs import (
+    NEGLIGIBLE,
     Inputs,
     Outputs,
     checked_inputs,
-    checked_outputs,
-)
-from ufl_beam.analysis.linear_model_checks import (
-    NEGLIGIBLE,
-    require_equilibrium,
+    checked_output,
     require_free,
-    warn_of_omissions,
 )
-from ufl_beam.analysis.modal_reduction import reduced_motion
 from ufl_beam.analysis.modes import require_state
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.analysis.state_space import (
@@ -34,6 +29,7 @@ from ufl_beam.analysis.state_space import (
     constraint_forces,
     first_order,
     jumps,
+    reduced_motion,
 )
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.discretization.model_warnings import warn_of_masses
@@ -50,6 +46,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.loads import Load
@@ -365,9 +362,8 @@ class LinearModel(Rich):
         x = (small._axes.T @ shapes)[small.left] / small.scale[small.left, None]
         x = np.hstack([x.real, x.imag])
         masses = np.sum(x * (M @ x), axis=0)
-        x = (x / np.sqrt(np.where(masses > 0.0, masses, 1.0)))[
-            :, masses > NEGLIGIBLE * masses.max()
-        ]
+        heavy = masses > NEGLIGIBLE * masses.max()
+        x = x[:, heavy] / np.sqrt(masses[heavy])
         values, mix = np.linalg.eigh(x.T @ (M @ x))
         chosen = values > NEGLIGIBLE * values.max()
         x = x @ (mix[:, chosen] / np.sqrt(values[chosen]))
@@ -452,7 +448,6 @@ class LinearModel(Rich):
 
     @property
     def _motion(self) -> Motion:
-        """Motions as functions of states and inputs."""
         return self._motion_and_rest[0]
 
     @cached_property
@@ -562,13 +557,13 @@ def linearize(
         >>> print(abs(model.frequency_response(1e-3)[0, 1]).round(6))  # as the support
         [1.]
     """
-    require_kind(scene, Scene, "linearize: scene")
     at = require_state("linearize", scene, at, mesh)
     sequences = {"inputs": inputs, "outputs": outputs}
     for name, some in sequences.items():
         if not require_sequence(some, f"linearize: {name}"):
             raise ArgumentError(f"linearize: {name} is empty; give at least one")
-    requested, wanted = checked_inputs(scene, inputs), checked_outputs(scene, outputs)
+    requested = checked_inputs(scene, inputs)
+    wanted = [checked_output(scene, x, f"linearize: outputs[{n}]") for n, x in enumerate(outputs)]
     unit = [x for x, _ in requested if isinstance(x, Load)]
     factors = {
         id(load): _Amplitude(load.amplitude if at is not None else Constant(0.0)) for load in unit
@@ -578,9 +573,18 @@ def linearize(
     small = SmallMotions(replace(scene, loads=loads) if unit else scene, at, mesh=mesh)
     if not small.M.data.any():
         raise ArgumentError("linearize: nothing that can move has mass; give sections rho or rhoA")
-    require_equilibrium(small, at)
+    small.require_equilibrium(at)
     warn_of_masses(scene)
-    warn_of_omissions(small, [x for x, _ in requested])
+    for connector in small.scene.all_connectors:
+        if isinstance(connector.law, Controller) and connector not in [x for x, _ in requested]:
+            warn(f"linearize: {connector}: the force of the controller is constant")
+    small.warn_of_relaxation("linearize")
+    small.warn_of_limits("linearize")
+    for group in small._simulation.equation.connector_terms:
+        if isinstance(group.law, Coulomb) and group.sticks is not None:
+            for connector, sticks in zip(group.connectors, group.sticks, strict=True):
+                if not sticks:
+                    warn(f"linearize: {connector}: sliding friction is left out")
     model_inputs = Inputs(small, scene, requested, factors)
     return LinearModel(small, scene, model_inputs, Outputs(small, scene, wanted, model_inputs))
 

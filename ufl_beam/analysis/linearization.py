@@ -35,7 +35,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_touching, warn_of_warping
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.errors import ArgumentError, ModelWarning, each_warning_once
+from ufl_beam.errors import ArgumentError, ModelWarning, each_warning_once, warn
 from ufl_beam.mechanics.time_scheme import Coefficients, Step
 from ufl_beam.mechanics.time_schemes import Newmark
 from ufl_beam.model.beams import Mesh
@@ -56,6 +56,9 @@ CHANGE = 1e-6  # change for difference quotients; rad, or fraction of the size o
 SLOWER = 10.0  # ratio of two steps in which forces of laws are compared
 RELAXES = 1e-6  # difference of viscosities from two steps that is not round-off, as a fraction
 KINK = 1e-3  # difference of stiffnesses beside a motion that is a kink, as a fraction
+UNBALANCED = 1e-6  # unbalanced force that is an error, as a fraction of the largest force
+MOVING = 1e-6  # velocity that is an error, as a fraction of lowest frequency times size
+NAMED = 3  # largest number of names in a message
 AT_REST = 1e150  # time step after which rates vanish; its square does not overflow; s
 
 
@@ -195,15 +198,14 @@ class Linearization:
         τ, T = self._in_short_step
         return (self._reduced(T) - self.K) * τ
 
-    @cached_property
-    def relaxing(self) -> list[Connector]:
-        """Connectors whose forces depend on the step in another way than by a viscosity.
+    def warn_of_relaxation(self, call: str) -> None:
+        """Warn of laws whose internal variables change in time, which have no matrix of damping.
 
-        Internal variables of a law that change in time cause this.
+        Their forces depend on the step in another way than by a viscosity.
         """
         τ, viscosities, laws = self._in_short_step[0], list[Array](), self._laws
         if not len(laws):
-            return []
+            return
         largest = np.zeros(len(laws))
         for factor in (1.0, SLOWER):
             forces = []
@@ -217,12 +219,17 @@ class Linearization:
             abs(A).max(axis=1).toarray().ravel()
             for A in (viscosities[1] - viscosities[0], abs(viscosities[0]) + abs(viscosities[1]))
         )
-        relaxes = apart > np.maximum(RELAXES * size, RELAXES * largest)
         where = dict(zip(self.numbering.multipliers, self.scene.all_connectors, strict=True))
-        return [where[law] for law in laws[relaxes]]
+        for law in laws[apart > RELAXES * np.maximum(size, largest)]:
+            warn(
+                f"{call}: {where[law]}: the force of the law changes in time while the motion is "
+                "constant, or depends on the length of a step; stiffness and viscosity cannot "
+                "describe this, so that results are wrong. Replace the law by springs and dampers, "
+                "with a body without mass between those in series"
+            )
 
-    def touching(self) -> list[Connector]:
-        """Return connectors whose stiffness differs on both sides of their motion in the state."""
+    def warn_of_limits(self, call: str) -> None:
+        """Warn of connectors whose stiffness differs on both sides of their motion in the state."""
         T, multipliers, found = self.tangent.tocsc(), self.numbering.multipliers, list[Connector]()
         for group in self._simulation.connector_terms:
             for i, connector in enumerate(group.connectors):
@@ -238,7 +245,13 @@ class Linearization:
                 # A slope that varies smoothly changes by half as much in half the distance.
                 if ((jumps > KINK * np.abs(slopes).max()) & (inner > 0.6 * jumps)).any():
                     found.append(connector)
-        return found
+        if found:
+            names = ", ".join(map(str, found[:NAMED])) + ", ..." * (len(found) > NAMED)
+            warn(
+                f"{call}: {names}: the motion of the state is at a limit, beside which the "
+                "stiffness differs, as of a stop that just touches, which counts as open. Give "
+                "at=, a state under loads or a preload that close or open it"
+            )
 
     def participation(self, direction: Array) -> tuple[Array, float]:
         """Return M r for a translation r of all nodes along a unit vector, and the moving mass.
@@ -306,29 +319,63 @@ class Linearization:
         scales = self.numbering.scales
         return np.divide(1.0, scales, out=np.ones(len(scales)), where=scales > 0)
 
-    def imbalance(self) -> tuple[Array, Array, Array]:
-        """Return unbalanced forces at free motions, sums of magnitudes, round-off; (size,) each."""
-        r, T = self._linearized(self.q)
-        laws, multipliers = self._laws, self.numbering.multipliers
-        sums = np.zeros(len(r))
+    def require_equilibrium(self, at: Solution | None) -> None:
+        """Raise unless the state, the last one of ``at``, is an equilibrium at rest."""
+        numbering, laws, T = self.numbering, self._laws, self.tangent
+        forces_and_gaps, _ = self._linearized(self.q)
+        terms = np.zeros(numbering.size)  # sums of magnitudes
         for term in self._simulation.equation.terms:
             if term.kind != "inertia":
-                forces = np.zeros(len(r))
+                forces = np.zeros(numbering.size)
                 term.add_residual(self.q, forces)
-                sums += np.abs(forces)
-        r = self._axes.T @ (r - T[:, laws] @ (r[laws] / T.diagonal()[laws]))
-        r[self._simulation.supports.dofs] = r[multipliers] = sums[multipliers] = 0.0
-        return r, sums, BALANCED * self.scene.size * abs(T).max(axis=1).toarray().ravel()
+                terms += np.abs(forces)
+        borne = T[:, laws] @ (forces_and_gaps[laws] / T.diagonal()[laws])
+        r = self._axes.T @ (forces_and_gaps - borne)
+        held = self._simulation.supports.dofs, numbering.multipliers
+        r[held[0]] = r[held[1]] = terms[held[1]] = 0.0
+        weights = np.ones(len(r))
+        weights[numbering.rotations] = 1 / self.scene.size
+        apart = np.abs(r) * weights
+        apart[apart <= UNBALANCED * np.max(terms * weights, initial=0.0)] = 0.0
+        apart[np.abs(r) <= self._round_off] = 0.0
+        worst = numbering.worst(apart)
+        gaps = self._gaps(forces_and_gaps)
+        worst |= {f"gap of {x}": gap for x, gap in gaps.items() if gap > UNBALANCED}
+        if worst:
+            listed = ", ".join(f"{name}: {value:.3g}" for name, value in [*worst.items()][:NAMED])
+            remedy = (
+                "loads or motions have changed, or dampers still bear forces; give the last state "
+                "of a static run of this scene in which nothing changes"
+                if at is not None
+                else "the undeformed scene is not in equilibrium with its loads, except inputs; "
+                "give at=simulate(scene, Static(), ...)"
+            )
+            raise ArgumentError(
+                f"linearize: no equilibrium; unbalanced forces (N) at {listed}: {remedy}"
+            )
+        if at is None or not len(at.v):
+            return
+        fast = np.abs(at.v[-1]) * numbering.scales
+        fast[fast <= MOVING * float(self.squares.min()) ** 0.5] = 0.0
+        for name, rate in [*numbering.worst(fast).items()][:1]:
+            raise ArgumentError(
+                f"linearize: at moves: {name} by {rate:.3g} 1/s of the size of the scene; give a "
+                "state at rest, as the last state of a static run, or of a run with more damping"
+            )
 
-    def gaps(self) -> dict[str, float]:
+    @property
+    def _round_off(self) -> Array:
+        """Forces at unknowns that are round-off; (size,); N, N m."""
+        sizes = abs(self.tangent).max(axis=1).toarray().ravel()
+        return np.asarray(BALANCED * self.scene.size * sizes)
+
+    def _gaps(self, r: Array) -> dict[str, float]:
         """Return gaps of constraints and prescribed motions by name; rad or size of the scene."""
-        r, t = self._linearized(self.q)[0], self._simulation.t
-        gaps, q = dict[str, float](), self.q.copy()
+        gaps, q, t = dict[str, float](), self.q.copy(), self._simulation.t
         if self.scene.in_space:
             self._set_rotations(q, rotation_vectors(self.turns))
-        for connector, force in zip(
-            self.scene.all_connectors, self.numbering.multipliers, strict=True
-        ):
+        connectors = zip(self.scene.all_connectors, self.numbering.multipliers, strict=True)
+        for connector, force in connectors:
             if force not in self._laws:
                 gap = abs(r[force]) / self.lengths[self._motion_of(connector)]
                 gaps[str(connector)] = max(float(gap), gaps.get(str(connector), 0.0))
@@ -351,7 +398,6 @@ class Linearization:
         return q
 
     def _set_rotations(self, q: Array, rotations: Array) -> None:
-        """Set rotations of nodes in space; (nodes, 3)."""
         dofs = np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[: len(rotations)]
         q[dofs[:, 3:]] = rotations
 
@@ -405,20 +451,15 @@ class Linearization:
     @cached_property
     def _others_in_cells(self) -> CellForces | None:
         """Forces on cells besides stress, inertia and dead loads; None if there are none."""
-        others = [
-            forces
-            for term in self._simulation.equation.terms
-            if term.kind not in ("beams", "inertia")
-            for forces in term.in_cells
-        ]
+        terms = self._simulation.equation.terms
+        terms = [term for term in terms if term.kind not in ("beams", "inertia")]
+        others = [forces for term in terms for forces in term.in_cells]
         return CellForces(self._simulation.subdomain, others) if others else None
 
     def unbalanced(self) -> str:
         """Return a warning of works, connectors, supports that disturb the equilibrium, or ""."""
-        t = self._simulation.t
-        r, T = self._linearized(self.q)
-        sizes = abs(T).max(axis=1).toarray().ravel()
-        apart = np.abs(self._axes.T @ r) > BALANCED * self.scene.size * sizes
+        t, (r, _) = self._simulation.t, self._linearized(self.q)
+        apart = np.abs(self._axes.T @ r) > self._round_off
         apart[self._simulation.supports.dofs] = False
         connectors = zip(self.scene.all_connectors, self.numbering.multipliers, strict=True)
         names = [str(connector) for connector, force in connectors if apart[force]]
@@ -473,13 +514,8 @@ def linear_forces_of_cells(
     subdomain = Subdomain(numbering, MPI.COMM_SELF)
     fields, space = Fields(subdomain), np.zeros(subdomain.size)
     stress, inertia = stress_forces(fields, section_law, about=q), mass_forces(fields)
-    cells = CellForces(
-        subdomain,
-        [
-            InCells(lambda: stress, lib.STRESS, fields.order),
-            InCells(lambda: inertia, lib.DENSITY, fields.order),
-        ],
-    )
+    both = (lambda: stress, lib.STRESS), (lambda: inertia, lib.DENSITY)
+    cells = CellForces(subdomain, [InCells(*form, fields.order) for form in both])
 
     def forces(x: Array, acceleration: Array) -> Array:
         stress.add(x, space)

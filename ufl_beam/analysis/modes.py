@@ -15,7 +15,6 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.analysis.constant_loads import AT, duration
-from ufl_beam.analysis.linear_model_checks import warn_of_limits, warn_of_relaxation
 from ufl_beam.analysis.small_motions import SmallMotions
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.blocks.beams import section_law
@@ -49,7 +48,7 @@ from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_pr
 from ufl_beam.model.loads import Load, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import Effect, VirtualWork
-from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
+from ufl_beam.output.paraview_files import VTKHDF, XDMF
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import StateOf, chosen_state, mesh_of
@@ -143,25 +142,28 @@ class Shapes(Rich, ABC):
         require_count(count, "motion: count")
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
-        states = np.ascontiguousarray(self.q + swing)
-        solution = Solution(self.scene, self.numbering)
-        history = {"t": times, "q": states, "every": np.array([1])}
+        forces: Array = np.zeros((count + 1, *self.resultants.shape))
+        if not self.scene.in_space:
+            subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
+            fields, r = Fields(subdomain), np.zeros(subdomain.size)
+            form = stress_forces(fields, self.section_law)
+            cell_forces = CellForces(subdomain, [InCells(lambda: form, lib.STRESS, fields.order)])
+            stresses = []
+            for q in (self.q, *np.ascontiguousarray(self.q + swing)):
+                form.add(q, r)
+                cell_forces.accept()
+                stresses.append(cell_forces(q, q))
+            forces[:] = self.resultants + np.array(stresses[1:]) - stresses[0]
+        return self._states(times, swing, forces)
+
+    def _states(self, times: Array, changes: Any, forces: Array) -> Solution:
+        """Return states with changes of the configuration, (n, size), and forces of cells."""
+        history = {"t": times, "q": self.q + changes, "every": np.array([1])}
         if self.scene.in_space:
-            turns = [turned_further(self.numbering, self.turns, change) for change in swing]
-            cells = np.zeros((count + 1, *self.resultants.shape))
-            solution.resume(history | {TURNS: np.array(turns), FORCES: cells})
-            return solution
-        subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
-        fields, r = Fields(subdomain), np.zeros(subdomain.size)
-        form = stress_forces(fields, self.section_law)
-        cell_forces = CellForces(subdomain, [InCells(lambda: form, lib.STRESS, fields.order)])
-        stresses = []
-        for q in (self.q, *states):
-            form.add(q, r)
-            cell_forces.accept()
-            stresses.append(cell_forces(q, q))
-        cells = self.resultants + np.array(stresses[1:]) - stresses[0]
-        solution.resume(history | {FORCES: cells})
+            further = [turned_further(self.numbering, self.turns, change) for change in changes]
+            history[TURNS] = np.array(further)
+        solution = Solution(self.scene, self.numbering)
+        solution.resume(history | {FORCES: forces})
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
@@ -179,21 +181,18 @@ class Shapes(Rich, ABC):
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
         recorder = VTKHDF(path) if Path(path).suffix in VTKHDF.endings else XDMF(path)
-        on_first(active_comm(), lambda: self._write(recorder, amplitude))
 
-    def _write(self, recorder: TimeSeries, amplitude: float) -> None:
-        recorder.require_writable()
-        subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
-        frames: list[Any] = [
-            _Frame(self, subdomain, float(k), self._scaled(k, amplitude).real)
-            for k in range(len(self))
-        ]
-        try:
-            recorder.open(frames[0])
-            for frame in frames[1:]:
-                recorder.write(frame)
-        finally:
-            recorder.close()
+        def write() -> None:
+            recorder.require_writable()
+            subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
+            changes = (self._scaled(k, amplitude).real for k in range(len(self)))
+            first, *others = (_Frame(self, subdomain, float(k), x) for k, x in enumerate(changes))
+            with closing(recorder):
+                recorder.open(first)  # type: ignore[arg-type]
+                for frame in others:
+                    recorder.write(frame)  # type: ignore[arg-type]
+
+        on_first(active_comm(), write)
 
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
         """Scale a mode so that its largest displacement is ``amplitude`` times the scene's size.
@@ -222,11 +221,7 @@ class _Frame:
         self.comm, self.subdomain = subdomain.comm, subdomain
         self.q, self.t = shapes.q + change, t
         self._shapes, self._fields, self._change = shapes, Fields(subdomain), change
-        self.now = Solution(self.scene, self.numbering)
-        history = {"t": np.array([t]), "q": self.q[None], "every": np.array([1])}
-        if self.scene.in_space:
-            history[TURNS] = turned_further(self.numbering, shapes.turns, change)[None]
-        self.now.resume(history | {FORCES: shapes.resultants[None]})
+        self.now = shapes._states(np.array([t]), change[None], shapes.resultants[None])
 
     def connections(self) -> Array:
         return np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
@@ -363,7 +358,6 @@ def modes(scene: Scene, n: int, *, at: StateOf | None = None, mesh: Mesh | None 
         >>> print(shapes.frequencies.round(1))  # Hz
         [ 41.5 250.6 646.8]
     """
-    require_kind(scene, Scene, "modes: scene")
     n = require_count(n, "modes: n")
     at = require_state("modes", scene, at, mesh)
     return computed_modes(scene, n, at, mesh)
@@ -395,13 +389,12 @@ def computed_modes(
     if not small.M.data.any():
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
-    warn_of_limits("modes", small)
+    small.warn_of_limits("modes")
     if damped:
-        warn_of_relaxation("modes", small)
+        small.warn_of_relaxation("modes")
     exponents, shapes = small.exponents(n, damped=damped)
-    stresses = _stresses(small, at)
     state = scene, small.numbering, small.q, small.turns
-    return Modes(*state, shapes, *stresses, exponents)
+    return Modes(*state, shapes, *_stresses(small, at), exponents)
 
 
 @each_warning_once()
@@ -445,7 +438,6 @@ def buckling(
         >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # times Euler's load
         1.00
     """
-    require_kind(scene, Scene, "buckling: scene")
     n = require_count(n, "buckling: n")
     at = require_state("buckling", scene, at, mesh)
     require_number(t, "buckling: t")
@@ -457,11 +449,8 @@ def buckling(
                 "vanishes or a damping ratio becomes negative"
             )
     functions = [function for _, function in scene.time_functions()]
-    if (
-        at is not None
-        and (scene.loads, scene.supports) == (at.scene.loads, at.scene.supports)
-        and all(f(t) == f(float(at.times[-1])) for f in functions)
-    ):
+    same = at is not None and (scene.loads, scene.supports) == (at.scene.loads, at.scene.supports)
+    if same and at is not None and all(f(t) == f(float(at.times[-1])) for f in functions):
         raise ArgumentError(
             f"buckling: loads and motions at t = {t:g} s are the same as in the state at "
             f"{float(at.times[-1]):g} s, so that nothing grows; give a larger t, or another state"
@@ -470,7 +459,7 @@ def buckling(
         raise ArgumentError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     small = SmallMotions(scene, at, t, mesh)
     require_no_spin("buckling", small, at)
-    warn_of_limits("buckling", small)
+    small.warn_of_limits("buckling")
     if scene.in_space:
         t0 = 0.0 if at is None else float(at.times[-1])  # loads grow from their values there
         static = Simulation(scene, Static(), t0=t0, start=at, mesh=mesh, comm=MPI.COMM_SELF)
@@ -496,9 +485,8 @@ def buckling(
     if not len(factors) or (others < np.abs(factors).max()).any():
         listed = ", ".join(f"{x:.4g}" for x in np.sort(others)[:n])
         warn(f"buckling: factors of magnitude {listed} are complex and left out{wrong}")
-    stresses = _stresses(small, at)
     state = scene, small.numbering, small.q, small.turns
-    return Buckling(*state, shapes, *stresses, factors, errors)
+    return Buckling(*state, shapes, *_stresses(small, at), factors, errors)
 
 
 def _stresses(small: SmallMotions, at: Solution | None) -> tuple[tuple[Array, Array], Array]:
@@ -521,16 +509,15 @@ def require_state(
     ``what`` is the function that needs the state.
     """
     require_kind(scene, Scene, f"{what}: scene")
-    if at is None:
+    state = chosen_state(at, f"{what}: at")
+    if state is None:
         require_no_prestress(scene, what, "give at=, a static solution")
-    elif (at := chosen_state(at, f"{what}: at")) and not DofNumbering(
-        scene, mesh_of(at, mesh)
-    ).agrees(at.numbering):
+    elif not DofNumbering(scene, mesh_of(state, mesh)).agrees(state.numbering):
         raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"
         )
-    return at
+    return state
 
 
 def require_no_spin(call: str, small: SmallMotions, at: Solution | None) -> None:

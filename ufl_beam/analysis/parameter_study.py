@@ -275,8 +275,7 @@ def _outcomes(
             for key, case in cases.items():
                 yield key, *_run(case)
             return
-        with MPICommExecutor(comm, root=0) as executor:
-            pool: Any = executor
+        with MPICommExecutor(comm, root=0) as pool:
             if pool is not None:
                 yield from _distributed(pool, cases)
     finally:
@@ -348,7 +347,6 @@ def _run(case: Case) -> Record:
 
 
 def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
-    """Raise unless an outcome has the names and shapes of the first outcome in ``records``."""
     if isinstance(outcome, str):
         return
     known = ((key, row) for key, (row, _) in records.items() if not isinstance(row, str))

@@ -325,11 +325,8 @@ class PathStepper:
         soft = _vanishes("softness", candidate, before, after)
         limit = self._turned(candidate) or _vanishes("slope", candidate, before, after)
         limit = limit and not (soft and _no_work(candidate, before, after))
-        if (
-            self._at_point
-            and not corrector.dissipates
-            and corrector.dissipation(candidate.trial.q1) > 0
-        ):
+        elastic_before = self._at_point and not corrector.dissipates
+        if elastic_before and corrector.dissipation(candidate.trial.q1) > 0:
             self._pass_kink(candidate, reached - 2 * LOCATION_TOLERANCE * fraction, fraction, limit)
             return
         # An eigenvalue may change its sign without passing zero where yielding or opening begins.
@@ -378,11 +375,9 @@ class PathStepper:
         step = np.append(trial.q1, trial.step.t1) - corrector.start
         size, predicted_step = (corrector.length(x) for x in (step, corrector.predicted_step))
         aligned = corrector.along(corrector.weights * step, corrector.predicted_step)
-        reverses = (
-            aligned < LEAST_COSINE * size * predicted_step
-            or size > LARGEST_LENGTH_RATIO * predicted_step
-        )
-        if fraction > UNCHECKED_FRACTION and reverses:
+        turns = aligned < LEAST_COSINE * size * predicted_step
+        leaps = size > LARGEST_LENGTH_RATIO * predicted_step
+        if fraction > UNCHECKED_FRACTION and (turns or leaps):
             raise StepFailed("the path turns too sharply, or the step leaps to another branch")
         if self._control.sense(corrector, direction, step) < 0:
             direction = -direction

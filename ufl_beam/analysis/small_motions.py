@@ -304,7 +304,6 @@ class SmallMotions(Linearization):
 
 
 def _same(one: tuple[float, float, Array], other: tuple[float, float, Array]) -> bool:
-    """Return whether two pairs of a factor and a shape are equal."""
     (λ, _, x), (λ1, _, y) = one, other
     parallel = abs(x @ y) > (1 - SAME) * np.linalg.norm(x) * np.linalg.norm(y)
     return bool(parallel and abs(λ / λ1 - 1) < SAME)

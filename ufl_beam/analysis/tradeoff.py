@@ -204,7 +204,6 @@ def _checked_target(
     tolerance: float | Mapping[str, float] | None,
     budget: float | None,
 ) -> Target:
-    """Return the target of a call, or raise :class:`ArgumentError`."""
     if (tolerance is None) == (budget is None):
         raise ArgumentError("tradeoff: give either a tolerance or a budget")
     if budget is not None:
@@ -236,7 +235,6 @@ def _several(values: Any, argument: str, check: Callable[..., object]) -> tuple[
 
 
 def _require_step(step: float | Adaptive, what: str) -> None:
-    """Raise :class:`ArgumentError` unless a step is a positive number or :class:`Adaptive`."""
     if not isinstance(step, Adaptive):
         require_number(step, what, positive=True)
 
@@ -327,7 +325,6 @@ class _Runs:
         return replace(coarsest, dt=dt, mesh=replace(mesh, refine=mesh.refine * refine))
 
     def in_family(self, family: int) -> list[Run]:
-        """Return the runs of a family."""
         return [run for refinement, run in self.runs.items() if refinement.family == family]
 
     def divisor(self, family: int) -> int:
@@ -481,7 +478,6 @@ class _Search:
         return max(x.uncertainty / self.units[n] for n, x in self.convergence.items())
 
     def best(self) -> Run:
-        """Return the best run of the family."""
         return min(self._runs.in_family(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:

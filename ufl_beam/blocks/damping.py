@@ -222,8 +222,8 @@ def viscous_cells(damping: KelvinVoigt, fields: Fields) -> Fields:
     """Return the cells of a viscosity."""
     subdomain, numbering = fields.subdomain, fields.subdomain.numbering
     beams = numbering.scene.beams if damping.beams is None else damping.beams
-    pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)
-    cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
+    without = [numbering.cells_of(beam) for beam in beams if beam.section.hinge is None]
+    cells = np.concatenate([np.zeros(0, int), *without])
     return Fields(subdomain, np.flatnonzero(np.isin(subdomain.cells, cells)))
 
 

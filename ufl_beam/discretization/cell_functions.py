@@ -103,12 +103,10 @@ class Cell:
         """Return points and weights of inertia: exact, or at the nodes if it is lumped."""
         if self.degree == 0:
             return [(0.0, 1.0)]
+        if not lumped:
+            return self.points(self.degree + 1)
         mesh = Mesh(degree=self.degree)
-        return (
-            [*zip(mesh.nodes, mesh.fractions, strict=True)]
-            if lumped
-            else self.points(mesh.degree + 1)
-        )
+        return [*zip(mesh.nodes, mesh.fractions, strict=True)]
 
     def forces(self, work: Any) -> list[Expr]:
         """Return the nodal forces whose work on the virtual motion is ``work``."""

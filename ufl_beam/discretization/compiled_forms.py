@@ -219,32 +219,25 @@ class Pointwise:
 
     def compile(self, *outputs: Expr) -> Any:
         """Compile a C function that computes the outputs, valid as long as this object exists."""
-        return tabulators(self._compiled(outputs)[0])[0]
+        return tabulators(self.form_of(outputs)[0])[0]
 
     def compile_loop(self, *outputs: Expr) -> Any:
         """Compile a loop over points that computes the outputs, an ``answer_loop`` of loops.h.
 
         The loop is null if it would not be faster than calls of the function.
         """
-        form, source = self._compiled(outputs)
+        form, source = self.form_of(outputs)
         ((address, sizes),) = _addressed(tabulators(form), [(len(outputs), len(self.at))])
         return ffi.cast("answer_loop *", point_loop(source, address, sizes) or 0)
 
     def form_of(
         self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING,
         flags: Sequence[str] = (),
-    ) -> str:  # fmt: skip
-        """Compile functions as integrals of one form; return the name of its entry in the cache.
+    ) -> tuple[fem.Form, Path]:  # fmt: skip
+        """Compile functions as integrals of a form; return it, and the C file that FFCx wrote.
 
         Nodes that are keys of ``instead`` are replaced.
         """
-        return self._compiled(*functions, instead=instead, flags=flags)[1].parent.name
-
-    def _compiled(
-        self, *functions: Sequence[Expr], instead: Mapping[Expr, Expr] = NOTHING,
-        flags: Sequence[str] = (),
-    ) -> tuple[fem.Form, Path]:  # fmt: skip
-        """Return a form with the functions as integrals, and the C file that FFCx wrote."""
         every = [x for outputs in functions for x in outputs]
         shared, sizes = iter(with_shared_nodes(every, instead)), [*map(len, functions)]
         z = ufl.TestFunction(self.values(most := max(sizes)))
@@ -293,16 +286,12 @@ def compiled_functions(key: str | None, state: Callable[[], Stated]) -> tuple[li
     """
 
     def compile_now() -> str:
-        made = state()
-        some = [*filter(None, made.functions)]
-        return json.dumps(
-            [
-                made.compiler.form_of(*some, instead=made.instead, flags=["-O0"] * made.large)
-                if some else "",
-                [(len(outputs), len(made.compiler.at)) for outputs in made.functions],
-                made.facts, made.inserted, made.unknowns, made.large,
-            ]
-        )  # fmt: skip
+        made, name = state(), ""
+        if some := [*filter(None, made.functions)]:
+            flags = ["-O0"] * made.large
+            name = made.compiler.form_of(*some, instead=made.instead, flags=flags)[1].parent.name
+        sizes = [(len(outputs), len(made.compiler.at)) for outputs in made.functions]
+        return json.dumps([name, sizes, made.facts, made.inserted, made.unknowns, made.large])
 
     text = remembered(f"functions_{key}", compile_now) if key else compile_now()
     name, sizes, facts, inserted, unknowns, large = json.loads(text)
@@ -322,6 +311,5 @@ def compiled_functions(key: str | None, state: Callable[[], Stated]) -> tuple[li
 
 
 def _addressed(functions: Sequence[Any], sizes: Sequence[tuple[int, int]]) -> Any:
-    """Return addresses of functions with their numbers of outputs and inputs."""
     addresses = (int(ffi.cast("intptr_t", x)) for x in functions)
     return tuple(zip(addresses, sizes, strict=True))

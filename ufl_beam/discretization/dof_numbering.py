@@ -36,7 +36,6 @@ from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.fibres import SectionPoints, stream_keys
 from ufl_beam.model.functions import points_along
 from ufl_beam.model.scene import Scene, not_in
-from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.works import Effect
 
@@ -182,23 +181,18 @@ class DofNumbering:
 
     def agrees(self, numbering: DofNumbering) -> bool:
         """Return whether ``numbering`` has the same beams, points and degrees of freedom."""
-        return (
-            self.scene.beams == numbering.scene.beams
-            and np.array_equal(self.points, numbering.points)
-            and np.array_equal(self.dofs, numbering.dofs)
-        )
+        same = self.scene.beams == numbering.scene.beams
+        arrays = (self.points, numbering.points), (self.dofs, numbering.dofs)
+        return same and all(np.array_equal(*pair) for pair in arrays)
 
     def checksum(self) -> int:
         """Compute a checksum of the points and the degrees of freedom."""
-        integers = np.concatenate(
-            [self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers]
-        )
+        integers = np.r_[self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers]
         return crc32(integers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
 
     # -- beams, vertices, cells ------------------------------------------------------------------
 
     def _index(self, beam: Member) -> int:
-        """Return the index of a beam of the scene."""
         number = self._beam_indices.get(beam)
         if number is not None:
             return number
@@ -249,10 +243,8 @@ class DofNumbering:
     def sections(self) -> tuple[list[Any], Index]:
         """Different sections of the beams, and the index of the section of each beam."""
         indices: dict[int, int] = {}
-        section_indices = [
-            indices.setdefault(id(b.section), len(indices)) for b in self.scene.beams
-        ]
-        beam_sections = np.array(section_indices, dtype=np.int32)
+        numbers = (indices.setdefault(id(b.section), len(indices)) for b in self.scene.beams)
+        beam_sections = np.array([*numbers], dtype=np.int32)
         firsts = np.unique(beam_sections, return_index=True)[1]
         return [self.scene.beams[i].section for i in firsts], beam_sections
 
@@ -315,10 +307,6 @@ class DofNumbering:
         first, last = np.append(np.nan, -half), np.append(half, np.nan)
         both = np.where(np.isnan(first), -last, first), np.where(np.isnan(last), -first, last)
         return np.asarray(chords[:, None] + np.nan_to_num(np.column_stack(both)))
-
-    def hinges(self, beam: Member) -> list[SofteningLaw | None]:
-        """Return the law of hinges at the integration points of each cell of a beam, or None."""
-        return [beam.section.hinge] * len(self.cells_of(beam))
 
     def keys(self, cells: Index) -> list[tuple[int, ...]]:
         """Return for each integration point the key of its random values, see :func:`stream_keys`.
@@ -406,7 +394,6 @@ class DofNumbering:
         return self.points[nodes], self.dofs[nodes]
 
     def _beam_nodes(self, beam: Member) -> Index:
-        """Return the nodes of a beam, including both sides of its hinges."""
         return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
 
     def node(self, point: AttachmentPoint) -> Index:
@@ -422,9 +409,7 @@ class DofNumbering:
     def rotations(self) -> Index:
         """Rotational degrees of freedom, each once, ascending."""
         first = self.displacements
-        return np.unique(
-            np.r_[self.dofs[:, first:].ravel(), self.dofs_of_bodies[:, first:].ravel()]
-        )
+        return np.asarray(np.unique(np.r_[self.dofs, self.dofs_of_bodies][:, first:]))
 
     @property
     def scales(self) -> Array:

@@ -3,19 +3,24 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import basix.ufl
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_forms
 from ufl_beam.compiled.csr import Csr, zero_matrix
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ModelError, shorten
-from ufl_beam.mechanics.kinematics import Axis
+from ufl_beam.mechanics.functional import kinetic_energy, virtual_work
+from ufl_beam.mechanics.kinematics import Axis, strain
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.scene import Scene
@@ -134,9 +139,7 @@ class Fields:
             connectors = subdomain.numbering.scene.all_connectors
             couples = [subdomain.cell_dofs, subdomain.connector_dofs, subdomain.body_dofs]
             couples += [dofs[None] for dofs in subdomain.effect_dofs.values()]
-            component = np.array(
-                [connectors[i].component for i in subdomain.connectors], dtype=np.int32
-            )
+            component = np.array([connectors[i].component for i in subdomain.connectors], int)
             for offset in range(1, component.max(initial=0) + 1):  # forces of a bushing are coupled
                 later, force = np.flatnonzero(component >= offset), subdomain.connector_dofs[:, -1]
                 couples.append(np.column_stack([force[later], force[later - offset]]))
@@ -201,10 +204,8 @@ class DolfinxFields(Fields):
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index | None = None) -> None:
-        numbering, cells = (
-            subdomain.numbering,
-            subdomain.cells if positions is None else subdomain.cells[positions],
-        )
+        numbering = subdomain.numbering
+        cells = subdomain.cells if positions is None else subdomain.cells[positions]
         vertices, local_vertices = np.unique(numbering.cells[cells], return_inverse=True)
         self.mesh = line_mesh(numbering.points[vertices], local_vertices.reshape(-1, 2))
         order: Index = np.asarray(self.mesh.topology.original_cell_index)
@@ -218,3 +219,56 @@ class DolfinxFields(Fields):
         for function, names in ((element.stiffness, STIFFNESS[d]), (element.inertia, INERTIA[d])):
             dofs = dofs_of_cells(function.function_space)
             function.x.array[dofs] = np.nan_to_num(self.section_values(*names).astype(float))
+
+
+# -- forms of the virtual work of beams, for views in DOLFINx --------------------------------------
+#
+# In steps, forces inside beams are the statements of ufl_beam/blocks/beams.py.
+
+
+@cached_forms
+def imposed_at_points(element: Element) -> fem.Function:
+    """Return the imposed strains of cells at both ends of a step; (6,); 1, 1, 1/m."""
+    return element.at_points(6)
+
+
+@cached_forms
+def elastic_form(element: Element, scheme: Scheme, *, imposed: bool = False) -> ufl.Form:
+    """Return the virtual work of elastic cells in a step of a time scheme."""
+    q0, q1, w, x = element.q0, element.q1, element.w, imposed_at_points(element)
+    ends = (strain(q, element.axis) for q in (q0, q1))
+    parts = [ufl.as_vector([x[i + k] for k in range(3)]) * imposed for i in (0, 3)]
+    e0, e1 = (e - part if imposed else e for e, part in zip(ends, parts, strict=True))
+    r = scheme.resultants(element.stiffness, e0, e1, element.constant)
+    return virtual_work(r, scheme.virtual_strain(q0, q1, w, element.axis)) * element.dx(1)
+
+
+@cached_forms
+def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
+    """Return the derivative of a virtual work with respect to ``q1``."""
+    return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
+
+
+@cached_forms
+def mass_form(element: Element) -> ufl.Form:
+    """Return the mass of the beams as a bilinear form; kg, kg m²."""
+    v = element.configuration()
+    energy = kinetic_energy(v, element.inertia) * element.dx_of_mass()
+    return derivative(ufl.derivative(energy, v, element.w), v)
+
+
+class InelasticForms(NamedTuple):
+    """Virtual work of b + D e, which is affine in the strains e."""
+
+    around: ufl.Form
+    b: fem.Function
+    D: fem.Function
+
+
+@cached_forms
+def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
+    """Return the forms of inelastic cells in a step of a time scheme."""
+    b, D = element.at_points(3), element.at_points(3, 3)
+    w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
+    resultants = b + ufl.dot(D, strain(element.q1, element.axis))
+    return InelasticForms(virtual_work(resultants, w_e) * element.dx(1), b, D)

@@ -29,11 +29,8 @@ def bisect(points: Array, number: int) -> Index:
         subdomains[these] = first
         if number > 1 and len(these):
             longer = np.ptp(points[these], axis=0).argmax()
-            half = number // 2
-            before, after = np.split(
-                these[np.argsort(points[these, longer], kind="stable")],
-                [len(these) * half // number],
-            )
+            half, sorted_ = number // 2, np.argsort(points[these, longer], kind="stable")
+            before, after = np.split(these[sorted_], [len(these) * half // number])
             to_divide += [(before, first, half), (after, first + half, number - half)]
     return subdomains
 
@@ -75,14 +72,9 @@ class Subdomain:
             owner[numbering.dofs[numbering.nodes_of_cells[cell_ranks == rank]]] = rank
         self.cells = np.flatnonzero(cell_ranks == comm.rank).astype(np.int32)
         cell_dofs = numbering.dofs[numbering.nodes_of_cells[self.cells]].transpose(0, 2, 1)
-        cell_dofs = cell_dofs.reshape(
-            len(self.cells),
-            -1 if len(self.cells) else numbering.width * (numbering.mesh.degree + 1),
-        )
-        hinge_dofs, hinge_cells = (
-            numbering.dofs[numbering.vertices_at_hinges],
-            numbering.cells_at_hinges,
-        )
+        cell_dofs = cell_dofs.reshape(-1, numbering.width * (numbering.mesh.degree + 1))
+        hinge_dofs = numbering.dofs[numbering.vertices_at_hinges]
+        hinge_cells = numbering.cells_at_hinges
         np.minimum.at(owner, hinge_dofs, cell_ranks[hinge_cells][:, None])
         connector_dofs = numbering.dofs_of_connectors
         connector_ranks = owner[connector_dofs].min(axis=1, initial=comm.size) % comm.size

@@ -149,25 +149,12 @@ class Transfer:
 
 def same_unknowns(old: DofNumbering, new: DofNumbering) -> bool:
     """Return whether degrees of freedom and connectors have equal numbers in two scenes."""
-    connectors = (
-        [geometry(connector) for connector in numbering.scene.all_connectors]
-        for numbering in (old, new)
-    )
-    return (
-        new.agrees(old)
-        and old.size == new.size
-        and old.scene.rigid_bodies == new.scene.rigid_bodies
-        and next(connectors) == next(connectors)
-    )
+    before, now = ([geometry(c) for c in x.scene.all_connectors] for x in (old, new))
+    same_bodies = old.scene.rigid_bodies == new.scene.rigid_bodies
+    return new.agrees(old) and old.size == new.size and same_bodies and before == now
 
 
 def geometry(connector: Connector) -> object:
     """Return a key that is equal for connectors of the same places and kind of law."""
-    return (
-        connector.motion,
-        connector.a,
-        connector.b,
-        connector.axis,
-        connector.corner,
-        type(connector.law),
-    )
+    names = "motion", "a", "b", "axis", "corner"
+    return *(getattr(connector, name) for name in names), type(connector.law)

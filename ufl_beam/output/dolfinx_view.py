@@ -12,18 +12,16 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.blocks.beams import section_law
-from ufl_beam.discretization.beam_forms import (
-    derivative,
-    elastic_form,
-    imposed_at_points,
-    inelastic_forms,
-    mass_form,
-)
 from ufl_beam.discretization.function_spaces import (
     STIFFNESS,
     DolfinxFields,
+    derivative,
     dofs_of_cells,
+    elastic_form,
+    imposed_at_points,
+    inelastic_forms,
     integrated,
+    mass_form,
 )
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes

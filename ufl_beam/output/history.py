@@ -309,7 +309,7 @@ class Events(Restartable):
         """Begin with the initial state, or continue from the events of a :meth:`state`."""
         self.found, self._rows = [], []
         numbering = simulation.numbering
-        in_cells = [law for beam in simulation.scene.beams for law in numbering.hinges(beam)]
+        in_cells = [numbering.scene.beams[i].section.hinge for i in numbering.beam_of_cell]
         connectors, hinges = simulation.scene.all_connectors, len(simulation.scene.hinges)
         first = len(connectors) - hinges
         # Hinges, which are the last connectors, and connectors that yield or break

@@ -78,8 +78,8 @@ def _law(solution: Solution, where: Place | Connector) -> HingeLaw | None:
     numbering = solution.numbering
     if (hinge := numbering.hinge_at(where)) is not None:
         return law_of(hinge)
-    number = numbering.cell(where) - int(numbering.cells_of(where.beam)[0])
-    return numbering.hinges(where.beam)[number]
+    hinge_of_cell: HingeLaw | None = where.beam.section.hinge
+    return hinge_of_cell
 
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:

@@ -156,10 +156,8 @@ class CheckpointFile:
             with decoding(self.path, FORMAT) as self.content:
                 now, then = self._described.texts, self.content["call"]
                 if self.content["python"] != PYTHON:
-                    now, then = (
-                        {n: text for n, text in texts.items() if not n.endswith(f".{CODE}")}
-                        for texts in (now, then)
-                    )
+                    code = f".{CODE}"
+                    now, then = ({n: x[n] for n in x if not n.endswith(code)} for x in (now, then))
                 step, before, differs = self._step, self.content["step"], difference(now, then)
                 if not differs and step and abs(step - before) > 1e-9 * before:
                     differs = f"the step is {step!r} s, in the file {before!r} s"
@@ -243,14 +241,14 @@ class CheckpointFile:
         content |= {"python": PYTHON, "call": self._described.texts, "step": self._step}
         at = f" of t = {content['state/t'][0]:.9g} s"
         history = solution.history
-        on_first(
-            self._comm,
-            lambda: write(self.path, FORMAT, {**content, **add_prefix("history/", history())}, at),
-        )
+
+        def write_all() -> None:
+            write(self.path, FORMAT, content | add_prefix("history/", history()), at)
+
+        on_first(self._comm, write_all)
         self._last_time, self._last_step = time.perf_counter(), pace.steps
 
     def _require_unchanged(self) -> None:
-        """Raise if functions have changed data that a restart would lose."""
         changed = difference(Description(self._call).texts, self._described.texts)
         if changed:
             raise ArgumentError(

@@ -35,9 +35,7 @@ class Controllers:
 
     def __init__(self, subdomain: Subdomain) -> None:
         connectors = subdomain.numbering.scene.all_connectors
-        active = [
-            connector for connector in connectors if isinstance(connector.law, Controller | Coulomb)
-        ]
+        active = [x for x in connectors if isinstance(x.law, Controller | Coulomb)]
         self.at: dict[Connector, int] = {connector: i for i, connector in enumerate(active)}
         self.values, self.fresh = np.zeros(len(active)), np.zeros(len(active), dtype=np.int32)
         self.sampled: dict[int, float] = {}
@@ -50,9 +48,7 @@ class Controllers:
             if isinstance(connector.law, Controller) and connector.law.sample:
                 self.sampled[i] = connector.law.sample
         self.needs_evaluation = bool(self._changing)
-        self._indices = np.array(
-            [i for i, connector in enumerate(connectors) if connector in self.at], dtype=int
-        )
+        self._indices = np.array([i for i, x in enumerate(connectors) if x in self.at], dtype=int)
         # Time of the first sample (s) and number of the latest sample; NaN before the first sample
         self._samples = np.full((len(active), 2), math.nan)
 
@@ -160,11 +156,9 @@ class ForceWatch:
         self._connectors, n = [connector for connector, *_ in watched], len(watched)
         if not n:
             return
+        places = [controllers.at.get(x) for x in self._connectors]
         values, fresh = (
-            [
-                start + controllers.at[x] if x in controllers.at else ffi.NULL
-                for x in self._connectors
-            ]
+            [ffi.NULL if place is None else start + place for place in places]
             for start in (doubles(controllers.values), integers(controllers.fresh))
         )
         self._told, none = np.full(n, math.nan), np.zeros((3, n))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import chain
 from typing import NamedTuple
 
 from mpi4py import MPI
@@ -296,12 +297,8 @@ def _describe(
         verb = "gives way" if len(names) == 1 else "give way together"
         said += f"; {_list(names, MOST_LISTED)} {verb} at no further force"
     sections = (numbering.scene.beams[numbering.beam_of_cell[i]].section for i in cells.soft)
-    laws = (
-        law
-        for section in sections
-        for points in section.section_points(None, numbering.scene.in_space)
-        for law, _ in points.laws
-    )
+    groups = (section.section_points(None, numbering.scene.in_space) for section in sections)
+    laws = (law for points in chain.from_iterable(groups) for law, _ in points.laws)
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
         said += (
@@ -370,9 +367,7 @@ class LedgerWatch:
             points = beam.section.section_points(beam.section.hinge, numbering.scene.in_space)
             if not all(class_points.elastic for class_points in points):
                 laws += [law for class_points in points for law, _ in class_points.laws]
-        springs = [
-            connector.law.law for connector in connectors if isinstance(connector.law, Spring)
-        ]
+        springs = (x.law.law for x in connectors if isinstance(x.law, Spring))
         laws += [law for law in springs if law is not None]
         grows = {"hinges": True, "plastic": all(map(dissipation_must_grow, laws))}
         # Schemes with forces at the end of a step compute works from the mean of the forces at both
@@ -380,16 +375,12 @@ class LedgerWatch:
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
         # True if elastic forces and variables of laws belong to the same instant
         at_once = scheme.theta == scheme.load_weight
-        user_laws = [
-            connector.law for connector in connectors if isinstance(connector.law, ConnectorLaw)
-        ]
+        user_laws = [x.law for x in connectors if isinstance(x.law, ConnectorLaw)]
         for law in user_laws:
             certain = exact and (at_once or not law.variables) and loss_must_grow(law)
             grows[law.entry] = grows.get(law.entry, exact) and certain
         self._grows = [name for name, certain in grows.items() if certain]
-        prescribed = any(
-            isinstance(connector.law, ForceLaw) and connector.law.stored for connector in connectors
-        )
+        prescribed = any(isinstance(x.law, ForceLaw) and x.law.stored for x in connectors)
         prescribed = prescribed or not all(isinstance(law, Stop) for law in user_laws)
         self._bounded = not prescribed and all(map(has_quadratic_energies, laws))
         self._in_motion = has_inertia(scheme)

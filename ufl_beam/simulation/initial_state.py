@@ -68,9 +68,13 @@ def checked_numbering(
     free_motion = ""
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
-    if scene.in_space:
-        require_for_space(scheme)
     if has_inertia(scheme):
+        if scene.in_space and not scheme.half_tangents:
+            raise ModelError(
+                f"{scheme!r}: rotations in space need EnergyMomentum(), EnergyMomentumDecaying(), "
+                "Static() or EnergyMomentumStatic(): this scheme adds changes of angles and their "
+                "rates, and in space a sum of angles about changing axes is no rotation"
+            )
         require_inertia(scene)
         warn_of_masses(scene)
         if scene.initial:
@@ -95,23 +99,11 @@ def checked_numbering(
     return numbering, free_motion
 
 
-def require_for_space(scheme: Scheme) -> None:
-    """Raise :class:`ModelError` for a scheme whose rotations are for the plane."""
-    if has_inertia(scheme) and not scheme.half_tangents:
-        raise ModelError(
-            f"{scheme!r}: rotations in space need EnergyMomentum(), EnergyMomentumDecaying(), "
-            "Static() or EnergyMomentumStatic(): this scheme adds changes of angles and their "
-            "rates, and in space a sum of angles about changing axes is no rotation"
-        )
-
-
 def require_rates(scene: Scene, scheme: DynamicScheme) -> None:
     """Raise :class:`ModelError` if a scheme lacks a mean velocity or damping that a scene needs."""
     name = type(scheme).__name__
-    for owner, what in [
-        *((c, c.law) for c in scene.all_connectors),
-        *((x, x) for x in scene.loads),
-    ]:
+    laws: list[Any] = [(c, c.law) for c in scene.all_connectors]
+    for owner, what in laws + [(load, load) for load in scene.loads]:
         if (isinstance(what, RotatingFrame) or has_friction(what)) and not scheme.has_mean_velocity:
             raise ModelError(
                 f"{name}: {owner} needs the mean velocity of a step, and this scheme takes all "
@@ -308,15 +300,13 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
     """
     size, speeds = numbering.scene.size, np.abs(v * numbering.scales)
     fastest = size * speeds.max()
-    for connector, dofs in zip(
-        numbering.scene.all_connectors, numbering.dofs_of_connectors, strict=True
-    ):
+    connectors = numbering.scene.all_connectors
+    for connector, dofs in zip(connectors, numbering.dofs_of_connectors, strict=True):
         a, b = v[dofs[:-1]].reshape(-1, 2).T
         by_a, by_b = connector.rigidly()
         rate = float(np.dot(by_a, a) + np.dot(by_b, b))
-        if connector.law is RIGID and abs(rate) > 1e-9 * fastest / (
-            size if connector.is_rotation else 1.0
-        ):
+        per = size if connector.is_rotation else 1.0
+        if connector.law is RIGID and abs(rate) > 1e-9 * fastest / per:
             raise ArgumentError(
                 f"Velocity: the parts that {connector} joins would move apart at {rate:.3g} m/s "
                 "or rad/s; give all joined parts velocities that agree"

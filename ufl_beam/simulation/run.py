@@ -38,14 +38,8 @@ from ufl_beam.output.serialization import Description
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch, warn_of_rayleigh
-from ufl_beam.simulation.initial_state import (
-    StateOf,
-    chosen_state,
-    mesh_of,
-    require_scheme,
-)
-from ufl_beam.simulation.reference_in_space import ReferenceInSpace
-from ufl_beam.simulation.reference_run import ReferenceRun
+from ufl_beam.simulation.initial_state import StateOf, chosen_state, mesh_of, require_scheme
+from ufl_beam.simulation.reference_run import ReferenceInSpace, ReferenceRun
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_lengths import (

@@ -178,11 +178,9 @@ class Simulation(Stepper):
             fill(self.time_loop, meet_jumps=lib.time_in_python, next_jump=-math.inf)
             self.time_loop.impacts = equation.callbacks.handle(self._meet_jumps)
         solution.needs_start = solution.equilibrium_fraction < 1 or self.cell_forces.needs_q0
-        solution.forces_from_record = (
-            self.cell_forces.forces_from_record
-            if subdomain.alone
-            else forces_of_scene(numbering, scheme, t0)
-        )
+        solution.forces_from_record = self.cell_forces.forces_from_record
+        if not subdomain.alone:
+            solution.forces_from_record = forces_of_scene(numbering, scheme, t0)
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
         # Whether loads that act from the start are applied in substeps at first, see stepper.py
@@ -218,7 +216,6 @@ class Simulation(Stepper):
 
     @staticmethod
     def _require_held(equation: StepEquation, q: Array) -> None:
-        """Raise if a joint or link does not fit the state with which a continued run begins."""
         for group in equation.connector_terms:
             if group.law is RIGID:
                 size = equation.subdomain.numbering.scene.size
@@ -290,12 +287,10 @@ class Simulation(Stepper):
             if keep:
                 columns = self._writer.columns
                 lacks_start = solution.needs_start and BEFORE not in columns.at
-                if self.subdomain.alone and (
-                    not lacks_start or solution.substeps_of_last == self.substeps
-                ):
-                    space = solution.free_rows(
-                        columns, min(number, 1 + MOST_VALUES // columns.width)
-                    )
+                follows = not lacks_start or solution.substeps_of_last == self.substeps
+                if self.subdomain.alone and follows:
+                    most = 1 + MOST_VALUES // columns.width
+                    space = solution.free_rows(columns, min(number, most))
                     row_limit, rows = len(space), doubles(space)
                 number = max(row_limit, 1)
             with self._in_c():

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import OtherVersion, State
-from ufl_beam.display import TIME, Rich
+from ufl_beam.display import TIME, Rich, counted
 from ufl_beam.errors import ArgumentError, Moved, require_kind, warn
 from ufl_beam.file_system import require_path
 from ufl_beam.mechanics.time_scheme import Scheme
@@ -198,12 +198,8 @@ class Solution(States, Rich):
         }  # fmt: skip
 
     def _arrays(self) -> State:
-        counts = {"counts": np.array([self.substeps, self.iterations])}
-        return {
-            **counts,
-            **add_prefix("history/", self.history()),
-            **add_prefix("internal/", self.internal),
-        }
+        arrays = add_prefix("history/", self.history()) | add_prefix("internal/", self.internal)
+        return {"counts": np.array([self.substeps, self.iterations])} | arrays
 
     def _set_content(self, content: Content) -> None:
         require_arrays(content, {"counts": (2,), "history/every": (1,)})
@@ -286,9 +282,9 @@ class Solution(States, Rich):
         if hinges := Opened(self).hinges():
             number, worst = sum(x.number for x in hinges), max(hinges, key=lambda x: x.error)
             lines.append(
-                f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
-                f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
-                f"s = {worst.place.s:.3g})"
+                f"embedded hinges opened in {counted((number, 'cell', 'cells'))}; their place "
+                f"within the cell shifts the limit by at most {_percent(worst.error)} "
+                f"({worst.beam.name}, cell at s = {worst.place.s:.3g})"
             )
         return lines
 
@@ -387,10 +383,8 @@ class Opened:
         numbering = self._numbering
         hinges = []
         for beam in numbering.scene.beams:
-            law = beam.section.hinge
-            cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
-            opened = np.any(self.first[cells] > 0, axis=1)
-            cells = cells[np.array([other_law is law for other_law in laws]) & opened]
+            law, cells = beam.section.hinge, numbering.cells_of(beam)
+            cells = cells[np.any(self.first[cells] > 0, axis=1)]
             if law is None or not len(cells) or law.limit == 0:
                 continue
             to_ends = numbering.lengths(cells) * numbering.mesh.points[0]
@@ -411,18 +405,12 @@ class Opened:
         numbering, times = self._numbering, self._times
         middle = numbering.mesh.degree == 1
         for beam in numbering.scene.beams:
-            cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
-            fall = {
-                law: max(
-                    (_fall(points, scheme) for points in beam.section.section_points(law)),
-                    default=(0.0, 0.0),
-                )
-                for law in set(laws)
-            }
-            falls, energies = np.array([fall[law] for law in laws]).T[:, :, None]
-            opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
+            cells, of_section = numbering.cells_of(beam), beam.section.section_points
+            falls = (_fall(points, scheme) for points in of_section(beam.section.hinge))
+            fall, energy = max(falls, default=(0.0, 0.0))
+            opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energy)
             lengths = numbering.section_lengths(cells).reshape(opened.shape)
-            ratios = np.where(opened, lengths, 0.0) * falls
+            ratios = np.where(opened, lengths, 0.0) * fall
             worst, point = divmod(int(np.argmax(ratios)), ratios.shape[1])
             ratio, length = ratios[worst, point], numbering.lengths(cells[[worst]])[0]
             t = times[self.first[cells[worst], point]]
@@ -451,18 +439,14 @@ class Opened:
                     ("in the middle", "in its middle") if middle else ("at a Gauss point", "there")
                 )
                 warn(
-                    f"{member.name}: the hinge of the section opened in {_cells_in_words(number)}, "
+                    f"{member.name}: the hinge of the section opened in "
+                    f"{counted((number, 'cell', 'cells'))}, "
                     f"{where} of a cell. At the ends of the cell at "
                     f"s = {place.s:.3g} the moment differs from the moment {at_point} by "
                     f"{_percent(error)} of the limit, so the load at which the hinge opens has the "
                     "same uncertainty. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
                 )
-
-
-def _cells_in_words(number: int) -> str:
-    """Return a number of cells in words: "1 cell", "2 cells"."""
-    return f"{number} cell{'s'[: number != 1]}"
 
 
 def _percent(fraction: float) -> str:
@@ -482,14 +466,10 @@ def _fall(section_points: SectionPoints, scheme: Scheme) -> tuple[float, float]:
     growth, begins = INCREMENT * law.fracture_energy / law.limit, np.array([law.steepest[1]])
     after = scheme.resistance(law, begins, np.array([growth]))
     (fall,) = (law.traction(begins) - after) / growth
-    before = (
-        law.mean_traction(0 * begins, begins)
-        * begins
-        * section_points.weights[section_points.breaking].min()
-    )
-    return float(
-        fall / (scheme.theta * section_points.stiffness[section_points.breaking].min())
-    ), float(before[0])
+    breaking = section_points.breaking
+    energy = law.mean_traction(0 * begins, begins) * begins * section_points.weights[breaking].min()
+    stiffness = scheme.theta * section_points.stiffness[breaking].min()
+    return float(fall / stiffness), float(energy[0])
 
 
 # -- text in the file ------------------------------------------------------------------------------

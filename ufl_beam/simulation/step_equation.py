@@ -232,10 +232,8 @@ class StepEquation:
         self.controllers.save_or_restore(archive, t)
         for term in self.remembering:
             term.save_or_restore(archive, q)
-        friction = any(
-            has_friction(connector.law)
-            for connector in self.subdomain.numbering.scene.all_connectors
-        )
+        scene = self.subdomain.numbering.scene
+        friction = any(has_friction(connector.law) for connector in scene.all_connectors)
         if self.inertia is None or self.supports.work or self.supports.about or friction:
             self.supports.carry_on(archive, q)
         if self.inertia is not None:
@@ -490,11 +488,8 @@ def equation_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Ste
 
 
 def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
-    """Return a function like :meth:`CellForces.forces_from_record` for all cells of a scene.
-
-    The first call of the function makes the equation of the whole scene, without communication.
-    """
-    equation = cache(partial(equation_of_scene, numbering, scheme, t0))
+    """Return a function like :meth:`CellForces.forces_from_record` for all cells of a scene."""
+    equation = cache(partial(equation_of_scene, numbering, scheme, t0))  # without communication
     return lambda *state: equation().cell_forces.forces_from_record(*state)
 
 

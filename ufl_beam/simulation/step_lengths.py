@@ -38,12 +38,9 @@ because functions may jump there."""
 
 def composition_error(stages: Sequence[float]) -> Rule:
     """Return the difference of Gauss's rule of order 6 to the midpoint rule of all stages."""
-    points, weights = gauss_rule(3)
-    lengths = np.array(stages)
-    return (
-        np.concatenate([points, np.cumsum(lengths) - lengths / 2]),
-        np.concatenate([weights, -lengths]),
-    )
+    (points, weights), lengths = gauss_rule(3), np.array(stages)
+    middles = np.cumsum(lengths) - lengths / 2
+    return np.append(points, middles), np.append(weights, -lengths)
 
 
 def step_count(time: float, dt: float) -> int:

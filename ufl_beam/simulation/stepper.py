@@ -208,12 +208,8 @@ class Stepper(StateView):
         path: StaticPath | None, solution: Solution, together: Agreement, free_motion: str,
     ) -> None:  # fmt: skip
         subdomain, scheme, ledger = equation.subdomain, equation.scheme, equation.ledger
-        self.comm, self.subdomain, self.numbering, self.scene = (
-            comm,
-            subdomain,
-            subdomain.numbering,
-            subdomain.numbering.scene,
-        )
+        self.comm, self.subdomain, self.numbering = comm, subdomain, subdomain.numbering
+        self.scene = subdomain.numbering.scene
         self.equation, self.scheme, self.ledger, self.solution = equation, scheme, ledger, solution
         self.newton = newton
         self.together, self._path, self._free_motion = together, path, free_motion

@@ -51,25 +51,24 @@ from ufl_beam.structures.hinge_laws import (
     IbarraKrawinkler,
     PinchingHinge,
 )
-from ufl_beam.structures.hinge_table import HingeTable as HingeTable
-from ufl_beam.structures.hinge_table import hinge_table
 from ufl_beam.structures.hysteresis_laws import (
     ArmstrongFrederick,
     AxialBending,
     BoucWen,
+    MenegottoPinto,
     RambergOsgood,
 )
 from ufl_beam.structures.imperfections import imperfect
+from ufl_beam.structures.incremental_dynamics import DemandCurves as DemandCurves
+from ufl_beam.structures.incremental_dynamics import Fragility as Fragility
 from ufl_beam.structures.incremental_dynamics import incremental_dynamic_analysis
-from ufl_beam.structures.incremental_dynamics_result import DemandCurves as DemandCurves
-from ufl_beam.structures.incremental_dynamics_result import Fragility as Fragility
+from ufl_beam.structures.load_combinations import Governing as Governing
+from ufl_beam.structures.load_combinations import LoadCombinations as LoadCombinations
 from ufl_beam.structures.load_combinations import load_combinations
-from ufl_beam.structures.load_combinations_result import Governing as Governing
-from ufl_beam.structures.load_combinations_result import LoadCombinations as LoadCombinations
+from ufl_beam.structures.pushover import HingeFormation as HingeFormation
+from ufl_beam.structures.pushover import Pushover as Pushover
+from ufl_beam.structures.pushover import TargetDisplacement as TargetDisplacement
 from ufl_beam.structures.pushover import pushover
-from ufl_beam.structures.pushover_result import HingeFormation as HingeFormation
-from ufl_beam.structures.pushover_result import Pushover as Pushover
-from ufl_beam.structures.pushover_result import TargetDisplacement as TargetDisplacement
 from ufl_beam.structures.response_spectra import ResponseSpectrum as ResponseSpectrum
 from ufl_beam.structures.response_spectra import response_spectrum
 from ufl_beam.structures.section_analysis import InteractionDiagram as InteractionDiagram
@@ -78,10 +77,10 @@ from ufl_beam.structures.section_analysis import interaction_diagram, moment_cur
 from ufl_beam.structures.sectionproperties import of_sectionproperties
 from ufl_beam.structures.spectral_analysis import SpectralResponse as SpectralResponse
 from ufl_beam.structures.spectral_analysis import response_spectrum_analysis
-from ufl_beam.structures.steel_laws import MenegottoPinto
 from ufl_beam.structures.steel_sections import box, channel, i_shape, steel, t_shape
-from ufl_beam.structures.storeys import Storeys as Storeys
-from ufl_beam.structures.storeys import storeys
+from ufl_beam.structures.storeys_and_hinges import HingeTable as HingeTable
+from ufl_beam.structures.storeys_and_hinges import Storeys as Storeys
+from ufl_beam.structures.storeys_and_hinges import hinge_table, storeys
 
 __all__ = [
     "ArmstrongFrederick",

@@ -307,7 +307,6 @@ class Variables:
 
 
 def _require_arguments(model: Model, variables: Variables, measurement: Measurement) -> None:
-    """Raise :class:`ArgumentError` unless the model accepts the arguments of a measurement."""
     if twice := [name for name in variables.names if name in measurement.arguments]:
         raise ArgumentError(
             f"{WHAT}: {twice[0]} is a parameter, and an argument of {measurement!r}"
@@ -407,7 +406,6 @@ class Problem:
         return np.asarray(rows / self.sigma[:, None])
 
     def _all_computed(self, x: Array) -> Array:
-        """Return the computed values of all measurements; (N,)."""
         if self._last[0] != x.tobytes():
             self._last = x.tobytes(), np.concatenate([self._computed(m, x) for m in self.measured])
         return self._last[1]
@@ -479,7 +477,6 @@ class Problem:
         return x, best.x, float(best.cost)
 
     def _minimum(self, x: Array) -> Any:
-        """Return the result of SciPy's search from x."""
         return scipy.optimize.least_squares(
             self.residuals, x, self.jacobian, bounds=self.variables.bounds, **TOLERANCES
         )

@@ -52,7 +52,6 @@ def _require_sigma(value: Any, what: str) -> Any:
 
 
 def _require_labels(value: Any, what: str) -> tuple[str, str]:
-    """Return two texts as a tuple, or raise."""
     texts = require_all(value, what, str)
     if len(texts) != 2:
         raise ArgumentError(f"{what} = {shorten(value)} must be two texts, for the axes")

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -163,7 +163,6 @@ class _Bound(NamedTuple):
         return positive(smaller(self.breaking(x), falling))
 
     def at(self, x: Values) -> Values:
-        """Return the bound."""
         lines = smaller(self.first + self.hardening * x, self.reference - self.falls * x)
         bound = smaller(self.most, larger(self.residual, lines))
         return positive(smaller(self.breaking(x), bound))
@@ -193,13 +192,18 @@ class _Bound(NamedTuple):
             larger(caps, (self.reference - self.residual) / down),
         )
         kinks = (*(smaller(kink, breaks) for kink in kinks), breaks, top / steep)
-        total, x, moment = 0.0, start, self.at(start)
-        for kink in (*kinks, end):
-            next_x = smaller(end, larger(x, kink))
-            next_moment = self.at(next_x)
-            total += (next_x - x) * (moment + next_moment) / 2
-            x, moment = next_x, next_moment
-        return total
+        return _integral(self.at, start, (*kinks, end))
+
+
+def _integral(at: Callable[[Values], Values], start: Values, kinks: Sequence[Values]) -> Values:
+    """Integrate from ``start`` to the last of the kinks, between which ``at`` is linear."""
+    total, x, value = 0.0, start, at(start)
+    for kink in kinks:
+        next_x = smaller(kinks[-1], larger(x, kink))
+        next_value = at(next_x)
+        total += (next_x - x) * (value + next_value) / 2
+        x, value = next_x, next_value
+    return total
 
 
 class _Reloading(NamedTuple):
@@ -218,7 +222,6 @@ class _Reloading(NamedTuple):
         return positive(larger(self.first * (x - self.start), second))
 
     def at(self, x: Values) -> Values:
-        """Return the bound."""
         return where(below(x, self.target), self.lines(x), self.backbone.at(x))
 
     def meets(self, stiffness: Values, p: Values) -> Values:
@@ -229,16 +232,10 @@ class _Reloading(NamedTuple):
         return where(below(x, self.target), x, self.backbone.meets(stiffness, p))
 
     def integral(self, start: Values, end: Values) -> Values:
-        """Return the integral of the bound."""
         last, steeper = larger(start, smaller(end, self.target)), self.second - self.first
         root = self.second * self.target - self.moment
         corner = (root - self.first * self.start) / larger(steeper, self.backbone.least_slope)
-        total, x, moment = 0.0, start, self.lines(start)
-        for kink in (self.start, corner, last):
-            next_x = smaller(last, larger(x, kink))
-            next_moment = self.lines(next_x)
-            total += (next_x - x) * (moment + next_moment) / 2
-            x, moment = next_x, next_moment
+        total = _integral(self.lines, start, (self.start, corner, last))
         return total + self.backbone.integral(larger(start, self.target), larger(end, self.target))
 
 
@@ -289,10 +286,9 @@ class _DeterioratingHinge(Record, ConnectorLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        backbones = {"plus": self.backbone, "minus": self.negative or self.backbone}
         data = {
             f"{name}_{side}": x
-            for side, backbone in backbones.items()
+            for side, backbone in self._backbones.items()
             for name, x in backbone.data(self.stiffness).items()
         }
         limit = self.backbone.yield_limit
@@ -303,6 +299,10 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         data |= {"stiffness": self.stiffness, "exponent": self.exponent}
         vars(self).update(data, _numbers=data)
 
+    @property
+    def _backbones(self) -> dict[str, Backbone]:
+        return {"plus": self.backbone, "minus": self.negative or self.backbone}
+
     def parameters(self) -> dict[str, Any]:
         """Return the numbers of the lines of both backbones, and the reference energies."""
         return dict(vars(self)["_numbers"])
@@ -310,11 +310,9 @@ class _DeterioratingHinge(Record, ConnectorLaw):
     @property
     def elastic_rotation(self) -> tuple[float, float]:
         """Elastic stiffness (N m/rad), and the lower of the two yield limits (N m)."""
-        backbones = self.backbone, self.negative or self.backbone
-        return self.stiffness, min(x.yield_limit for x in backbones)
+        return self.stiffness, min(x.yield_limit for x in self._backbones.values())
 
     def energy(self, motion: Values, state: State) -> Values:
-        """Return the elastic energy; J."""
         return state.rest * self.stiffness * (motion - state.plastic) ** 2 / 2
 
     def increments(
@@ -353,8 +351,7 @@ class _DeterioratingHinge(Record, ConnectorLaw):
             most=most * sided("largest"), last=sided("last"), ultimate=sided("ultimate"),
             steep=sided("steep"), least_slope=1e-12 * self.stiffness,
         )  # fmt: skip
-        excursion = _Excursion(crosses, p, before, ratios, sided)
-        bound, path = self._path(backbone, state, excursion)
+        bound, path = self._path(backbone, state, _Excursion(crosses, p, before, ratios, sided))
         limit = bound.at(x)
         flows = below(limit, stiffness * (x - p))
         start = bound.meets(stiffness, p)
@@ -467,13 +464,8 @@ class PinchingHinge(_DeterioratingHinge):
     Earthquake Eng. Struct. Dyn. 34 (2005); IMKPinching and IMKPeakOriented in OpenSees.
 
     Args:
-        stiffness: Elastic stiffness; N m/rad or N/m.
-        backbone: Backbone of positive moments, and of negative ones unless ``negative`` is given.
-        negative: Backbone of negative moments, with positive numbers.
-        strength: Reference cumulative rotation Λ of the basic strength; rad or m.  The default,
-            infinity, means no deterioration, here and below.
-        softening: Λ of the strength after capping; rad or m.
-        unloading: Λ of the unloading stiffness; rad or m.
+        stiffness, backbone, negative: As of :class:`IbarraKrawinkler`, like the next two rows.
+        strength, softening, unloading: Reference rotations Λ; rad or m.
         exponent: Exponent c, at least 1.
         kappa_F: Factor κF of the moment where both lines meet, above 0 and at most 1.
         kappa_D: Factor κD of the rotation there, from 0 to 1.
@@ -511,8 +503,8 @@ class PinchingHinge(_DeterioratingHinge):
                 raise ModelError(
                     f"PinchingHinge: {name} = {getattr(self, name):g} is a fraction, at most 1"
                 )
-        backbones = {"plus": self.backbone, "minus": self.negative or self.backbone}
-        yields = {f"yields_{n}": b.yield_limit / self.stiffness for n, b in backbones.items()}
+        sides = self._backbones.items()
+        yields = {f"yields_{side}": x.yield_limit / self.stiffness for side, x in sides}
         more = yields | {name: getattr(self, name) for name in ("kappa_F", "kappa_D")}
         vars(self)["_numbers"].update(more)
         vars(self).update(more)
@@ -520,7 +512,6 @@ class PinchingHinge(_DeterioratingHinge):
     def _path(
         self, backbone: _Bound, state: State, excursion: _Excursion
     ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
-        """Return the bound of an excursion, and the new values of the variables of its path."""
         crosses, p, before, ratios, sided = excursion
         stiffness, least = before * self.stiffness, 1e-12 * sided("yields")
         farther = 1 + ratios["reloading"] ** self.exponent

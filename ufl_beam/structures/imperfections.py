@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -97,7 +97,8 @@ def imperfect(
         raise ArgumentError(
             "imperfect: nothing changes the geometry; give sway=, bow= or mode= with amplitude="
         )
-    change = _Change(scene, lean, amplitudes, mode, k, amplitude)
+    lowest = min((point[-1] for beam in scene.beams for point in beam.ends), default=0.0)
+    change = _Change(np.append(lean, 0.0), lowest, amplitudes, mode, k, amplitude)
     return change(scene)  # type: ignore[no-any-return]
 
 
@@ -130,24 +131,23 @@ class Displaced:
         return tuple((swayed + self.bow * wave + moved).tolist())
 
 
+@dataclass(frozen=True, eq=False)
 class _Change:
     """Change of geometry; a call returns a record with new beams, bodies and places."""
 
-    def __init__(
-        self, scene: Scene, sway: Array, bows: Mapping[Beam, Array], mode: Shapes | None, k: int,
-        amplitude: float,
-    ) -> None:  # fmt: skip
-        self._sway, self._bows, self._mode, self._k = np.append(sway, 0.0), bows, mode, k
-        self._amplitude = amplitude
-        heights = [point[-1] for beam in scene.beams for point in beam.ends]
-        self._lowest = min(heights, default=0.0)
-        self._made: dict[int, tuple[Any, Any]] = {}  # by id; the reference keeps the id in use
+    sway: Array  # displacement by height; (2 or 3,)
+    lowest: float  # height without sway; m
+    bows: Mapping[Beam, Array]
+    mode: Shapes | None
+    k: int
+    amplitude: float
+    made: dict[int, tuple[Any, Any]] = field(default_factory=dict)  # by id, which it keeps in use
 
     def __call__(self, old: Any) -> Any:
         """Return an object with new places, or the object itself if it has none."""
-        if id(old) not in self._made:
-            self._made[id(old)] = old, self._renew(old)
-        return self._made[id(old)][1]
+        if id(old) not in self.made:
+            self.made[id(old)] = old, self._renew(old)
+        return self.made[id(old)][1]
 
     def _renew(self, old: Any) -> Any:
         if old is GROUND or isinstance(old, type | Section):
@@ -176,10 +176,10 @@ class _Change:
 
     def _curve(self, beam: Beam) -> Displaced:
         along, up = np.array(beam.ends[1]) - beam.ends[0], np.array(beam.up)
-        size = self._bows.get(beam, np.zeros(len(self._sway) - 1))
+        size = self.bows.get(beam, np.zeros(len(self.sway) - 1))
         s = np.array([0.0, 1.0])
-        if self._mode is not None:
-            numbering = self._mode.numbering
+        if self.mode is not None:
+            numbering = self.mode.numbering
             s, pieces = numbering.parameters(beam), 1 if numbering.mesh.degree == 1 else 12
             s = np.interp(np.arange(pieces * (len(s) - 1) + 1) / pieces, np.arange(len(s)), s)
         shape = np.array([self._motion(beam.at(float(x))) for x in s])
@@ -189,27 +189,26 @@ class _Change:
             third = np.cross(along, up)
             third *= np.linalg.norm(along) / np.linalg.norm(third)
             bow = size @ [np.cross(third, along / np.linalg.norm(along)), third]
-        return Displaced(beam.curve, self._sway, self._lowest, bow, s, shape)
+        return Displaced(beam.curve, self.sway, self.lowest, bow, s, shape)
 
     def _motion(self, place: AttachmentPoint) -> Array:
         """Return the displacement of a place in the mode; (2 or 3,); m."""
         d = len(place.point)
-        if self._mode is None:
+        if self.mode is None:
             return np.zeros(d)
-        return np.asarray(self._amplitude * self._mode.shape(self._k, place)[:d])
+        return np.asarray(self.amplitude * self.mode.shape(self.k, place)[:d])
 
     def _point(self, place: BodyPoint) -> Point:
         point = np.array(place.point)
-        swayed = point + self._sway * (point[-1] - self._lowest)
+        swayed = point + self.sway * (point[-1] - self.lowest)
         return tuple((swayed + self._motion(place)).tolist())
 
 
 def _rebuilt(old: Any, **changed: Any) -> Any:
     """Return a copy of a record with other values of some fields, which are checked anew."""
     new = object.__new__(type(old))
-    for field in fields(old):
-        if field.init:
-            value = changed.get(field.name, getattr(old, field.name))
-            object.__setattr__(new, field.name, value)
+    for f in fields(old):
+        if f.init:
+            object.__setattr__(new, f.name, changed.get(f.name, getattr(old, f.name)))
     getattr(new, "__post_init__", lambda: None)()
     return new

@@ -22,13 +22,13 @@ from ufl_beam.plotting.style import BLUE, COLORS, GREY, INK, ORANGE, RED, pictur
 from ufl_beam.structures.calibration_result import Calibration
 from ufl_beam.structures.fatigue import Fatigue, HotSpot
 from ufl_beam.structures.ground_motion import GroundMotion
-from ufl_beam.structures.incremental_dynamics_result import PERCENT, DemandCurves
-from ufl_beam.structures.load_combinations_result import LoadCombinations
-from ufl_beam.structures.pushover_result import Pushover, TargetDisplacement
+from ufl_beam.structures.incremental_dynamics import PERCENT, DemandCurves
+from ufl_beam.structures.load_combinations import LoadCombinations
+from ufl_beam.structures.pushover import Pushover, TargetDisplacement
 from ufl_beam.structures.response_spectra import ResponseSpectrum
 from ufl_beam.structures.section_analysis import InteractionDiagram, MomentCurvature
 from ufl_beam.structures.spectral_analysis import SpectralResponse
-from ufl_beam.structures.storeys import Storeys
+from ufl_beam.structures.storeys_and_hinges import Storeys
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,8 +86,8 @@ def draw_pushover(
             outward = sign * np.array([-0.6, 0.8])
             numbers.append(Label(str(number), INK, around(np.array(at), outward)))
         style.zero_lines(axes, x=False)
-        axes.set_xlabel(f"{pushover.component} of {pushover.place} (m)")
-        axes.set_ylabel(f"base shear ({prefix}N)")
+        place = f"{pushover.component} of {pushover.place} (m)"
+        axes.set(xlabel=place, ylabel=f"base shear ({prefix}N)")
         if several or 0 < len(steps) <= MOST_NAMED:
             style.draw_legend(
                 axes, ax, loc="outside upper left", ncols=2, fontsize=style.font_size(10.0)
@@ -100,11 +100,8 @@ def draw_response(
     response: SpectralResponse, *, quantity: str = "M", ax: Axes | None = None
 ) -> Figure:
     """Draw a section force of a :class:`SpectralResponse` on the frame, with both signs."""
-    diagrams = [
-        (beam, sign * getattr(response.diagram(beam), quantity)[:, None])
-        for beam in response.scene.beams
-        for sign in (1.0, -1.0)
-    ]
+    forces = [(x, getattr(response.diagram(x), quantity)[:, None]) for x in response.scene.beams]
+    diagrams = [(beam, sign * values) for beam, values in forces for sign in (1.0, -1.0)]
     title = style.resultant(quantity)[0], "by response spectrum"
     return draw_envelope(response.modes.motion(0), title, quantity, diagrams, ax)
 
@@ -205,11 +202,9 @@ def draw_spectrum(spectrum: ResponseSpectrum, quantity: str, ax: Axes | None = N
     """Draw one quantity of a response spectrum over the period."""
     with style.panel(ax, (7.0, 4.2)) as axes:
         axes.plot(spectrum.periods, getattr(spectrum, quantity))
-        axes.set_xlabel("period (s)")
-        axes.set_ylabel(f"{quantity.replace('_', '-')}{SPECTRA[quantity]}")
-        axes.set_ylim(bottom=0.0)
+        label = f"{quantity.replace('_', '-')}{SPECTRA[quantity]}"
+        axes.set(xlabel="period (s)", ylabel=label, ylim=(0.0, None), axisbelow=True)
         axes.grid(visible=True, linewidth=0.8)
-        axes.set_axisbelow(True)
     return style.parent_figure(axes)
 
 
@@ -328,7 +323,6 @@ def calibration_page(fit: Calibration) -> str:
 
 
 def _of_forces(draw: Any, names: Sequence[str] = ("M", "N", "V")) -> dict[str, Any]:
-    """Return a picture for each quantity."""
     return {name: partial(draw, quantity=name) for name in names}
 
 

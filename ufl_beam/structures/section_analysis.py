@@ -61,7 +61,6 @@ class _State:
         self._largest = 0.0  # strain so far, of the axis or by curvature
 
     def begin(self, dt: float) -> None:
-        """Begin a step of length ``dt``; s."""
         for points in self._points:
             points.begin(dt)
 

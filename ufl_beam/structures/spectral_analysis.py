@@ -36,7 +36,7 @@ from ufl_beam.model.supports import Support
 from ufl_beam.output.section_forces import Diagram, DiagramInSpace, ForcesAlongCells
 from ufl_beam.simulation.initial_state import StateOf, chosen_state
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.structures.spectra import Spectrum, spectral_accelerations
+from ufl_beam.structures.response_spectra import Spectrum, spectral_accelerations
 
 RULES = "CQC", "SRSS"
 NO_MASS = 1e-12  # fraction of the mass below which an effective mass is printed as zero
@@ -304,7 +304,6 @@ def cqc(omega: Array, damping: float) -> Array:
 
 
 def _resultants(basis: Modes, sizes: Array, at: Solution | None) -> Array:
-    """Return the resultants of a :class:`SpectralResponse`."""
     if basis.scene.in_space:
         given = None if at is None else at.forces_in_middle(-1)
         forces = linear_forces_in_space(basis.numbering, basis.q, basis.turns, given)

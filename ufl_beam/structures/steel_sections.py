@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from functools import cache, lru_cache
 from pathlib import Path
@@ -58,11 +58,9 @@ def steel(designation: str, **material: Any) -> Section:
         )
     kind, sizes = table[name]
     material = {"E": 210e9, "nu": 0.3, "rho": 7850.0} | material
-    if kind == "box":
-        return box(*sizes, **material)
-    if kind == "tube":
-        return Section.tube(*sizes, **material)
-    return (i_shape if kind == "I" else channel)(*sizes, **material)
+    kinds: dict[str, Callable[..., Section]]
+    kinds = {"I": i_shape, "C": channel, "box": box, "tube": Section.tube}
+    return kinds[kind](*sizes, **material)
 
 
 def i_shape(h: float, b: float, tw: float, tf: float, r: float = 0.0, **material: Any) -> Section:
@@ -165,7 +163,6 @@ def _profile(
 
 
 def _shear_areas(walls: Walls) -> list[float]:
-    """Return the shear areas about the strong and the weak axis of walls; m²."""
     turned = [(1j * start, 1j * end, t) for start, end, t in walls]
     return [thin_walled_shear_area(walls), thin_walled_shear_area(turned)]
 
@@ -210,11 +207,8 @@ def _similar(name: str, table: Iterable[str]) -> list[str]:
 @cache
 def _steel_table() -> dict[str, tuple[str, tuple[float, ...]]]:
     """Return the kind and the dimensions (m) of each designation."""
-    rows = [
-        line.split(",")
-        for line in Path(__file__).with_name("steel_shapes.csv").read_text("utf-8").splitlines()
-        if not line.startswith("#")
-    ]
+    lines = Path(__file__).with_name("steel_shapes.csv").read_text("utf-8").splitlines()
+    rows = [line.split(",") for line in lines if not line.startswith("#")]
     return {name: (kind, tuple(float(mm) / 1000 for mm in sizes)) for name, kind, *sizes in rows}
 
 
@@ -243,15 +237,10 @@ def flanged(kind: str, h: float, b: float, tw: float, tf: float, r: float) -> tu
 def box_walls(b: float, h: float, t: float) -> Walls:
     """Return the walls of a rectangular hollow section that bends in the plane of ``h``; m."""
     x, y = (b - t) / 2, (h - t) / 2
-    return [
-        wall
-        for i in (-1, 1)
-        for j in (-1, 1)
-        for wall in (
-            (complex(0, j * y), complex(i * x, j * y), t),
-            (complex(i * x, j * y), complex(i * x, 0), t),
-        )
-    ]
+    walls: Walls = []
+    for corner in (complex(i * x, j * y) for i in (-1, 1) for j in (-1, 1)):
+        walls += [(complex(0.0, corner.imag), corner, t), (corner, complex(corner.real), t)]
+    return walls
 
 
 def thin_walled_shear_area(walls: Walls) -> float:
