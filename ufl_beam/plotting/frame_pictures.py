@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -31,14 +31,9 @@ from ufl_beam.plotting.positions import (
     normal,
     unit_vectors,
 )
-from ufl_beam.plotting.style import BLUE, GREY, INK, RED, font_size, shade
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, Artist, Axes, Figure, font_size, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LEAST_STRAIN = 1e-10  # strain up to which section forces count as round-off and are not drawn
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero

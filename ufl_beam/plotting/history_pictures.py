@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -31,13 +31,9 @@ from ufl_beam.plotting.labels import (
     set_up_in_space,
 )
 from ufl_beam.plotting.positions import PICTURE, evenly
-from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, Axes, Figure, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def _components(names: Sequence[str], rotations: Sequence[str]) -> dict[str, tuple[str, str]]:

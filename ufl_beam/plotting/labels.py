@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,11 +23,7 @@ from ufl_beam.plotting.positions import (
     joined,
     segments,
 )
-from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, font_size, shade
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.text import Annotation
+from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, Annotation, Axes, font_size, shade
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Space for words and numbers around the axes, least size and largest size of a figure; inch."""

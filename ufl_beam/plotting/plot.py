@@ -6,7 +6,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
@@ -31,11 +31,8 @@ from ufl_beam.plotting.inelastic_pictures import (
 )
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
-from ufl_beam.plotting.style import COLUMNS, COMPONENTS, RESULTANTS
+from ufl_beam.plotting.style import COLUMNS, COMPONENTS, RESULTANTS, Figure
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Scene: {"model": draw_model},

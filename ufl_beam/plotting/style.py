@@ -20,10 +20,13 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
+    from matplotlib.artist import Artist as Artist
+    from matplotlib.axes import Axes as Axes
     from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.text import Annotation as Annotation
+else:
+    Artist = Axes = Axis = Figure = Annotation = Any
 
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PINK, ORANGE, SKY = (
