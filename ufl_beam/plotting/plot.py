@@ -24,11 +24,7 @@ from ufl_beam.plotting.history_pictures import (
     draw_modes,
     draw_shapes,
 )
-from ufl_beam.plotting.inelastic_pictures import (
-    draw_dissipation,
-    draw_hinge,
-    draw_moment_curvature,
-)
+from ufl_beam.plotting.inelastic_pictures import draw_dissipation, draw_hinge, draw_moment_curvature
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
 from ufl_beam.plotting.style import COLUMNS, COMPONENTS, RESULTANTS, Figure

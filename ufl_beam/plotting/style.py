@@ -216,14 +216,6 @@ def shade(color: str) -> str:
     return str(chosen.get(color, color))
 
 
-def plane_axes(axes: Axes, title: str) -> None:
-    """Set up axes of the plane of motion with one scale for x and y."""
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.06, 0.10)
-    axes.set_title(title, loc="left", wrap=True)
-
-
 def time_axes(axes: Axes) -> Axes:
     """Set up axes for histories over time."""
     axes.margins(x=0.0)
