@@ -408,25 +408,21 @@ def require_capacity(cells: int, what: str) -> None:
         )
 
 
-def require_vector(value: Any, what: str) -> tuple[float, float]:
-    """Return ``value`` as a pair of finite floats, or raise :class:`ArgumentError`."""
-    try:
-        if isinstance(value, str | bytes):
-            raise TypeError
-        x, y = value
-    except (TypeError, ValueError):
-        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a pair (x, y)") from None
-    return require_number(x, f"{what}[0]"), require_number(y, f"{what}[1]")
-
-
-def require_point(value: Any, what: str) -> tuple[float, ...]:
+def require_point(value: Any, what: str, most: int = 3) -> tuple[float, ...]:
     """Return ``value`` as two or three finite floats, or raise :class:`ArgumentError`."""
     try:
-        if len(value) == 3 and not isinstance(value, str | bytes):
-            return tuple(require_number(x, f"{what}[{i}]") for i, x in enumerate(value))
+        numbers = () if isinstance(value, str | bytes) else tuple(value)
     except TypeError:
-        pass
-    return require_vector(value, what)
+        numbers = ()
+    if not 2 <= len(numbers) <= most:
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a pair (x, y)")
+    return tuple(require_number(x, f"{what}[{i}]") for i, x in enumerate(numbers))
+
+
+def require_vector(value: Any, what: str) -> tuple[float, float]:
+    """Return ``value`` as a pair of finite floats, or raise :class:`ArgumentError`."""
+    x, y = require_point(value, what, most=2)
+    return x, y
 
 
 def require_array(values: Any, what: str) -> npt.NDArray[np.float64]:

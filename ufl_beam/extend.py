@@ -22,18 +22,7 @@ from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.output.recorder import Recorder
 
 __all__ = [
-    "Coefficients",
-    "ConnectorLaw",
-    "DynamicScheme",
-    "EnergyMomentumBase",
-    "Equations",
-    "Joint",
-    "MaterialLaw",
-    "MidpointDynamics",
-    "Recorder",
-    "Scheme",
-    "SofteningLaw",
-    "Statement",
-    "Step",
+    "Coefficients", "ConnectorLaw", "DynamicScheme", "EnergyMomentumBase", "Equations", "Joint",
+    "MaterialLaw", "MidpointDynamics", "Recorder", "Scheme", "SofteningLaw", "Statement", "Step",
     "law_functions",
-]
+]  # fmt: skip

@@ -19,6 +19,7 @@ from test_space import KINDS, OTHER, STIFF, TURNS, in_plane, in_space, same_moti
 
 import ufl_beam as ub
 import ufl_beam.structures as st
+from ufl_beam.output.history import MOTION
 
 SECTION = ub.Section(**STIFF, **OTHER)
 EXACT = ub.Newton(rtol=1e-13)
@@ -28,6 +29,34 @@ SKEW = Rotation.from_rotvec([0.3, -0.7, 1.1])
 
 def skew(*vector):
     return tuple(SKEW.apply(vector))
+
+
+# -- tables ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.serial  # files
+def test_a_table_has_the_six_components_of_a_place(tmp_path):
+    """[closed] A body that a joint holds: the forces of the joint are its weight and its moment."""
+    body = ub.Body((1.0, 0.0, 0.0), mass=2.0, inertia=(0.1, 0.2, 0.2), name="load")
+    joint = ub.Rigid(ub.ground(0, 0, 0), body.at(0, 0, 0), multipliers=True)
+    held = ub.Scene(bodies=[body], joints=[joint], loads=[ub.Gravity((3.0, 0.0, -10.0))])
+    table = ub.History(tmp_path / "table.csv", [body.middle], [joint], accelerations=[body.middle])
+    run = ub.simulate(held, ub.EnergyMomentum(), t=(0, 0.2), dt=0.1, record=table, **RUN)
+    header, *lines = (tmp_path / "table.csv").read_text().replace('"', "").splitlines()
+    names = [f"{x} load (1, 0, 0) [{'m' if x in 'uvw' else 'rad'}]" for x in MOTION[3]]
+    assert ",".join(names) in header
+    rows = np.genfromtxt(lines, delimiter=",")
+    assert rows.shape == (3, len(np.genfromtxt([lines[0]], delimiter=",")))
+    np.testing.assert_allclose(rows[:, 1:7], run.displacement(body.middle), atol=1e-12)
+    np.testing.assert_allclose(rows[1:, 7:13], 0.0, atol=1e-9)
+    assert header.count("force Rigid(") == 6
+    forces = [np.where([f"), {x} [" in c for c in split(header)])[0][1] for x in ("x", "z", "ry")]
+    assert np.abs(rows[-1, forces]) == pytest.approx([6.0, 20.0, 20.0], rel=1e-9)
+
+
+def split(header):
+    """Names of columns, which have commas in parentheses."""
+    return re.split(r",(?![^(]*\))(?! )", header)
 
 
 # -- friction --------------------------------------------------------------------------------------

@@ -15,22 +15,9 @@ import numpy as np
 
 from ufl_beam.display import at_point, bracketed
 from ufl_beam.errors import ModelError, shorten
-from ufl_beam.model.checks import (
-    require_all,
-    require_array,
-    require_kind,
-    require_number,
-    require_point,
-    require_switch,
-)
+from ufl_beam.model import checks
 from ufl_beam.model.functions import Curve, Point, tangent_within
-from ufl_beam.model.records import (
-    NotNegative,
-    Record,
-    Text,
-    VectorOfScene,
-    require_moment,
-)
+from ufl_beam.model.records import NotNegative, Record, Text, VectorOfScene, require_moment
 
 TOGETHER = 1e-9  # largest distance at which two places of a beam coincide, as a fraction of a cell
 
@@ -79,7 +66,7 @@ class Member(ABC):
         return coordinates
 
 
-Beams = Annotated[Sequence[Member] | None, partial(require_all, kind=Member)]
+Beams = Annotated[Sequence[Member] | None, partial(checks.require_all, kind=Member)]
 """Type of a field with beams; None stands for all beams of the scene."""
 
 
@@ -110,10 +97,10 @@ class Place:
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Member):
             raise ModelError(f"Place: {shorten(self.beam)} is not a Beam")
-        require_number(self.s, f"{self.beam.name}.at(s): s")
+        checks.require_number(self.s, f"{self.beam.name}.at(s): s")
         if not 0.0 <= self.s <= 1.0:
             raise ModelError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
-        require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
+        checks.require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
 
     @property
     def point(self) -> Point:
@@ -142,8 +129,8 @@ class Place:
 def require_inertia_of_body(value: Any, what: str) -> Any:
     """Return the inertia of a body: a number, or moments or a tensor in space."""
     if np.ndim(value) == 0:
-        return require_number(value, what, at_least=0.0)
-    given = require_array(value, what)
+        return checks.require_number(value, what, at_least=0.0)
+    given = checks.require_array(value, what)
     tensor = np.diag(given) if given.shape == (3,) else given
     if tensor.shape != (3, 3) or not np.allclose(tensor, tensor.T, rtol=1e-12):
         raise ModelError(f"{what} must be three moments, or a symmetric 3 x 3 matrix")
@@ -233,8 +220,8 @@ class BodyPoint:
     __repr__ = bracketed
 
     def __post_init__(self) -> None:
-        require_kind(self.body, Body, "BodyPoint: body")
-        point = require_point(self.point, f"{self.body.name}.at(x, y)")
+        checks.require_kind(self.body, Body, "BodyPoint: body")
+        point = checks.require_point(self.point, f"{self.body.name}.at(x, y)")
         if self.body is not GROUND and len(point) != len(self.body.center):
             raise ModelError(
                 f"{self.body.name}.at{point}: the centre has {len(self.body.center)} coordinates; "
@@ -400,10 +387,10 @@ class Velocity(Record):
         (-5.0, 0.0, 2.0)
     """
 
-    beams: Annotated[tuple[Member | Body, ...], partial(require_all, kind=(Member, Body))]
+    beams: Annotated[tuple[Member | Body, ...], partial(checks.require_all, kind=(Member, Body))]
     linear: VectorOfScene = (0.0, 0.0)
     angular: Annotated[Any, require_moment] = 0.0
-    about: Annotated[Any, require_point] = None
+    about: Annotated[Any, checks.require_point] = None
 
     def attached_to(self) -> Iterable[AttachmentPoint]:
         """See the base class."""

@@ -192,10 +192,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - energy, resistance or limit must be def
 
 
 def require_connector_law(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless a connector law is complete.
-
-    This function calls the methods of the law at zero motion.  A run compiles them.
-    """
+    """Raise :class:`ModelError` unless a connector law is complete, by calls at zero motion."""
     what = f"{what}: {type(law).__name__}"
     require_fields(law, ConnectorLaw, what)
     for name, value in law.parameters().items():

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from numbers import Real
@@ -14,11 +14,11 @@ from ufl_beam.errors import ModelError, closed
 from ufl_beam.model.checks import require_function, require_kind, require_number, require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law import ForceLaw as ForceLaw
-from ufl_beam.model.functions import Constant, GuideCurve, Timed, TimeFunction
+from ufl_beam.model.functions import Constant, GuideCurve, Timed
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State, require_law
 from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic
-from ufl_beam.model.records import Instance, NotNegative, Number, Positive, Record
+from ufl_beam.model.records import Instance, NotNegative, Number, Positive, PositiveOrNone, Record
 from ufl_beam.model.softening_laws import (
     LinearSoftening,
     Softening,
@@ -50,10 +50,6 @@ class PrescribedMotion(Record):
 
     motion: Timed
 
-    def functions_of_time(self) -> Iterable[TimeFunction]:
-        """See the base class."""
-        return (self.motion,)
-
 
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
@@ -74,10 +70,6 @@ class PrescribedForce(Record):
     """
 
     force: Timed
-
-    def functions_of_time(self) -> Iterable[TimeFunction]:
-        """See the base class."""
-        return (self.force,)
 
 
 class Bearing:
@@ -122,7 +114,7 @@ class Controller(Record):
     """
 
     force: Annotated[Callable[[Any], float], partial(require_function, arguments="the simulation")]
-    sample: Annotated[float | None, partial(require_number, positive=True)] = None
+    sample: PositiveOrNone = None
 
     def evaluate(self, simulation: Running, connector: object) -> float:
         """Return the force until the next evaluation; N or N m; all processes must call this."""

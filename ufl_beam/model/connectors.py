@@ -341,6 +341,9 @@ class Component(Connector):
         return self.owner
 
 
+IN_SPACE = Turn, Stretch, Slide
+"""Connectors for scenes in space."""
+
 UNIT_TOLERANCE = 4 * sys.float_info.epsilon
 """Largest round-off error of the length of a unit vector."""
 

@@ -12,15 +12,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, warn
-from ufl_beam.model.bodies import (
-    GROUND,
-    AttachmentPoint,
-    Body,
-    Member,
-    Node,
-    base_of,
-    node,
-)
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, Member, Node, base_of, node
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     DRIVING,
@@ -62,11 +54,7 @@ SHIFT, ZERO = 1e-14, 1e-13  # shift, and largest eigenvalue of a null vector, as
 
 
 def require_inertia(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a beam or body can move with neither inertia nor resistance.
-
-    Rigid motions without inertia need stiffness, damping or constraints.  Otherwise the equations
-    of motion are singular.
-    """
+    """Raise :class:`ModelError` if a beam or body can move with neither inertia nor resistance."""
     d, rotations = (3, 3) if scene.in_space else (2, 1)
     own = [(beam.section.rhoA, beam.section.rhoA or beam.section.rhoI) for beam in scene.beams]
     own += [(body.mass, float(np.any(body.tensor))) for body in scene.bodies]
@@ -183,10 +171,9 @@ def friction_repeats(scene: Scene) -> bool:
 def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:
     """Find linearly dependent constraints of connectors and of supports in rotated axes.
 
-    With ``friction``, sticking friction is a constraint, too.  The function returns candidates,
-    which are constraints with their owners, and a matrix.  Each column has the factors of a linear
-    combination of candidates that vanishes at all free degrees of freedom.  A constraint that alone
-    acts on a degree of freedom is independent.  Such constraints are removed one by one.
+    With ``friction``, sticking friction is a constraint, too.  The results are candidates, which
+    are constraints with their owners, and a matrix, whose columns have factors of combinations of
+    candidates that vanish.  Constraints that alone act on a degree of freedom are left out.
     """
 
     def holds(connector: Connector) -> bool:
@@ -236,10 +223,9 @@ def _gradient(scene: Scene, row: Row, fixed: set[Unknown]) -> dict[Unknown, floa
 def require_no_mechanism(scene: Scene) -> str:
     """Raise :class:`ModelError` if the scene is a mechanism without loads.
 
-    Loads may stabilize a mechanism, as weight stabilizes a pendulum.  Only the tangent stiffness in
-    equilibrium shows this.  So for a mechanism with loads the function returns a description of the
-    free motions, otherwise an empty text.  A motion without strain moves each beam as a rigid body.
-    Such a motion exists if the constraints on rigid motions have a null space.
+    Loads may stabilize a mechanism, as weight stabilizes a pendulum, which only the tangent in
+    equilibrium shows.  So with loads the function describes the free motions, if there are any.
+    A motion without strain moves each beam as a rigid body.
     """
     free = _free_motions(scene, lambda connector: resists(connector.law))
     if free.shape[1] == 0:
@@ -425,9 +411,8 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 def warn_of_held_motions(scene: Scene) -> None:
     """Warn of springs, dampers and hinges whose motion joints or supports hold at zero.
 
-    Motors are left out, because a state for their start may hold them.
-    The gradient of such a motion is a combination of constraints of joints between the same places,
-    or vanishes at all free degrees of freedom.
+    Motors are left out, because a state for their start may hold them.  The gradient of such a
+    motion is a combination of constraints between the same places, or vanishes.
     """
     if not scene.connectors:
         return

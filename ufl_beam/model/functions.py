@@ -20,14 +20,7 @@ import scipy  # loads its submodules at their first use
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError, NoNumber, closed, shorten
-from ufl_beam.model.checks import (
-    require_function,
-    require_number,
-    require_point,
-    require_returned,
-    require_sequence,
-    require_vector,
-)
+from ufl_beam.model import checks
 
 Point = tuple[float, float]
 
@@ -151,12 +144,14 @@ class Spline(GuideCurve):
     __repr__ = compact_repr
 
     def __post_init__(self) -> None:
-        points = require_sequence(self.points, "Spline: points")
-        points = tuple(require_vector(p, f"Spline: points[{i}]") for i, p in enumerate(points))
+        points = checks.require_sequence(self.points, "Spline: points")
+        points = tuple(
+            checks.require_vector(p, f"Spline: points[{i}]") for i, p in enumerate(points)
+        )
         steps = (math.dist(p, q) for p, q in pairwise(points))
         given = [*accumulate(steps, initial=0.0)] if self.s is None else self.s
-        for i, number in enumerate(s := require_sequence(given, "Spline: s")):
-            require_number(number, f"Spline: s[{i}]")
+        for i, number in enumerate(s := checks.require_sequence(given, "Spline: s")):
+            checks.require_number(number, f"Spline: s[{i}]")
         if len(points) < 2 or len(s) != len(points):
             raise ModelError(
                 f"Spline: {len(points)} points, {len(s)} parameters s; give at least two points, "
@@ -200,12 +195,12 @@ def between(p: Point, q: Point, s: float) -> Point:
 
 def curve_point(curve: Curve, s: float, what: str) -> Point:
     """Evaluate a user's curve at ``s``, or raise :class:`ModelError`; m."""
-    require_function(curve, what, "s that returns (x, y)")
+    checks.require_function(curve, what, "s that returns (x, y)")
     try:
         point = curve(s)
     except Exception as error:
         raise ModelError(f"{what}({s:g}) fails: {shorten(error)}") from error
-    return require_point(point, f"{what}({s:g})")  # type: ignore[return-value]
+    return checks.require_point(point, f"{what}({s:g})")  # type: ignore[return-value]
 
 
 def points_along(
@@ -319,7 +314,7 @@ def ramp(duration: float) -> TimeFunction:
         >>> growth(0.5), growth(2.0), growth(9.0)
         (0.25, 1.0, 1.0)
     """
-    require_number(duration, "ramp: duration", positive=True)
+    checks.require_number(duration, "ramp: duration", positive=True)
     return Table((0.0, duration), (0.0, 1.0))
 
 
@@ -348,12 +343,12 @@ class Table:
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):
-            checked = require_sequence(getattr(self, name), f"Table: {name}")
+            checked = checks.require_sequence(getattr(self, name), f"Table: {name}")
             object.__setattr__(self, name, checked)
             if {*map(type, checked)} <= {float} and np.isfinite(checked).all():
                 continue  # a record has many numbers
             for i, number in enumerate(checked):
-                require_number(number, f"Table: {name}[{i}]")
+                checks.require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise ModelError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "
@@ -405,7 +400,7 @@ def value_at(function: TimeFunction, t: float, owner: object) -> float:
     """
     value = function(t)
     if not isinstance(value, float):  # np.float64 is a float
-        value = require_returned(value, f"{owner}: the time function", f"t = {t:.9g} s")
+        value = checks.require_returned(value, f"{owner}: the time function", f"t = {t:.9g} s")
     if not math.isfinite(value):
         raise NoNumber(f"{owner}: the time function is {value} at t = {t:.9g} s")
     return float(value)

@@ -313,19 +313,15 @@ class _OnRail(Joint):
     rail: AttachmentPoint
     slider: AttachmentPoint
     axis: Any
-
-    @property
-    def turns(self) -> bool:
-        """True if the slider turns on the rail."""
-        return True
+    turning: bool = True  # True if the slider turns on the rail
 
     def __post_init__(self) -> None:
         super().__post_init__()
         axis = unit_axis(self.rail, self.slider, self.axis, type(self).__name__)
-        vars(self).update(axis=axis, shared=() if self.turns else (2,))
+        vars(self).update(axis=axis, shared=() if self.turning else (2,))
         normals: Any = across(axis) if len(axis) == 3 else ((-axis[1], axis[0]),)
         holders = [self._hold("sliding", normal) for normal in normals]
-        if self.turns and len(axis) == 3:  # the slider turns about the axis only
+        if self.turning and len(axis) == 3:  # the slider turns about the axis only
             holders += [self._hold("aligning", normal, other=axis) for normal in normals]
         vars(self).update(holders=tuple(holders))
 
@@ -356,11 +352,6 @@ class Prismatic(_OnRail):
     _: KW_ONLY
     axis: Point | None = None
     turning: Switch = False
-
-    @property
-    def turns(self) -> bool:
-        """See the base class."""
-        return self.turning
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -533,3 +524,7 @@ class Release(_AtPoint):
         """Components of motion that are equal at both places."""
         displacement = () if set(self.free) & set("NV") else (0, 1)
         return displacement if "M" in self.free else (*displacement, 2)
+
+
+IN_SPACE = Rigid, Revolute, Spherical, Universal, Prismatic, Cylindrical, RigidLink, Link
+"""Joints for scenes in space."""

@@ -53,10 +53,6 @@ class Load(Record, ABC):
     amplitude: TimeFunction  # factor on the load, a function of time t (s)
     dead: ClassVar[bool] = True  # False if the forces depend on the motion
 
-    def functions_of_time(self) -> Iterable[TimeFunction]:
-        """See the base class."""
-        return (self.amplitude,)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadAtPlace(Load):
@@ -206,11 +202,7 @@ class LoadAlongBeam(Load):
         return (self.beam.at(s) for s in self.span)
 
     def factors(self, s: Array) -> Array:
-        """Return the factors of the profile at parameters ``s``; they are zero outside of the span.
-
-        Raises:
-            ModelError: The profile is not a finite number at one of them.
-        """
+        """Return the factors of the profile at parameters ``s``, see :func:`profile_at`."""
         return profile_at(s, self.profile, self.span, f"{self}: profile")
 
 
@@ -372,10 +364,6 @@ class MovingLoad(Load):
         """See the base class."""
         return (beam.start for beam in self.route)
 
-    def functions_of_time(self) -> Iterable[TimeFunction]:
-        """See the base class."""
-        return self.amplitude, self.position
-
     @property
     def route(self) -> tuple[Member, ...]:
         """The beams in the order of the distance."""
@@ -441,6 +429,10 @@ class RotatingFrame(Load):
     # A rate that varies in time would cause a further force, the Euler force.
     amplitude: ClassVar[TimeFunction] = steady  # type: ignore[misc]
     dead: ClassVar = False
+
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """See the base class."""
+        return (steady,)
 
 
 LOADS = PointLoad, FollowerLoad, LineLoad, Pressure, MovingLoad, Gravity, RotatingFrame

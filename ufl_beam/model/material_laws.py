@@ -19,13 +19,7 @@ import numpy as np
 
 from ufl_beam.errors import ModelError, closed
 from ufl_beam.model.checks import require_kind, require_number
-from ufl_beam.model.law_functions import (
-    Values,
-    below,
-    positive,
-    sign,
-    where,
-)
+from ufl_beam.model.law_functions import Values, below, positive, sign, where
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import FromZero, Record
 

@@ -35,12 +35,14 @@ from ufl_beam.errors import (
     require_text,
     require_vector,
 )
+from ufl_beam.model.functions import TimeFunction, require_time_function
 
 T = TypeVar("T")
 
 Number = Annotated[float, require_number]
 Positive = Annotated[float, partial(require_number, positive=True)]
 NotNegative = Annotated[float, partial(require_number, at_least=0.0)]
+PositiveOrNone = Annotated[float | None, partial(require_number, positive=True)]
 FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)]
 """Type of a field with a number that is not negative, or infinity."""
 
@@ -132,9 +134,10 @@ class Record:
         place = getattr(self, "place", None)
         return () if place is None else (place,)
 
-    def functions_of_time(self) -> Iterable[Callable[[float], float]]:
-        """Return the functions of time of the record."""
-        return ()
+    def functions_of_time(self) -> Iterable[TimeFunction]:
+        """Return the functions of time of the record, by default all fields of type ``Timed``."""
+        checks = _checks(type(self))  # type: ignore[arg-type]
+        return [getattr(self, x) for x, *_, check in checks if check is require_time_function]
 
 
 @cache

@@ -14,6 +14,7 @@ import numpy as np
 from ufl_beam.caches import no_garbage_collection
 from ufl_beam.display import Rich, counted
 from ufl_beam.errors import ArgumentError, ModelError, clip
+from ufl_beam.model import connectors, joints, supports
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
@@ -32,44 +33,23 @@ from ufl_beam.model.bodies import (
 )
 from ufl_beam.model.checks import require_all
 from ufl_beam.model.connector_laws import Bearing, Coulomb, RigidPlastic
-from ufl_beam.model.connectors import (
-    Component,
-    Connector,
-    Slide,
-    Stretch,
-    Turn,
-    plastic_hinges,
-)
+from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.fibres import stream_keys
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along
 from ufl_beam.model.imposed_strains import ImposedStrain
-from ufl_beam.model.joints import (
-    Cylindrical,
-    Joint,
-    Link,
-    Prismatic,
-    Revolute,
-    Rigid,
-    RigidLink,
-    Spherical,
-    Universal,
-)
+from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
     LOADS,
     Damping,
-    FollowerLoad,
-    Gravity,
     KelvinVoigt,
-    LineLoad,
     Load,
     LoadAtPlace,
     MovingLoad,
     PointLoad,
-    Pressure,
     RotatingFrame,
 )
 from ufl_beam.model.records import Record
-from ufl_beam.model.supports import Clamped, Pinned, PrescribedDisplacement, Roller, Support
+from ufl_beam.model.supports import Support
 from ufl_beam.model.works import Effect, Potential, VirtualWork, Work
 
 Unknown = tuple[NodeDof, int]
@@ -426,11 +406,9 @@ class Scene(Record, Rich):
 
 
 IN_SPACE = (
-    Beam, Body, Rigid, Revolute, Spherical, Universal, Prismatic, Cylindrical, RigidLink, Link,
-    Turn, Stretch, Slide, Clamped, Pinned, Roller, PrescribedDisplacement, PointLoad, FollowerLoad,
-    LineLoad, Pressure, MovingLoad, Gravity, RotatingFrame, Velocity,
-    KelvinVoigt,
-)  # fmt: skip
+    *(Beam, Body, *joints.IN_SPACE, *connectors.IN_SPACE, *supports.SUPPORTS, *LOADS),
+    *(Velocity, KelvinVoigt),
+)
 """Classes of the objects of scenes in space."""
 
 

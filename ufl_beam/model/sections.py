@@ -19,29 +19,15 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, Moved
 from ufl_beam.model import plausibility
-from ufl_beam.model.checks import (
-    require_all,
-    require_array,
-    require_kind,
-    require_number,
-)
+from ufl_beam.model.checks import require_all, require_array, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints, by_class
 from ufl_beam.model.material_law import MaterialLaw, require_law
 from ufl_beam.model.material_laws import ElastoPlastic
-from ufl_beam.model.records import Instance, NotNegative, Positive, Record, Switch
-from ufl_beam.model.shapes import (
-    Shape,
-    rounded_rectangle,
-)
+from ufl_beam.model.records import Instance, NotNegative, Positive, PositiveOrNone, Record, Switch
+from ufl_beam.model.shapes import Shape, rounded_rectangle
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 ResultantLaw = Annotated[MaterialLaw | None, require_law]
-
-
-def require_stiffness(value: float | None, what: str) -> None:
-    """Raise :class:`ModelError` unless ``value`` is a positive number or None."""
-    if value is not None:
-        require_number(value, what, positive=True)
 
 
 RESULTANTS = {"axial": "EA", "shear": "GA", "bending": "EI"}
@@ -117,10 +103,10 @@ class Section(Record):
     fibres: Instance[PlacedFibres | None] = None
     interaction: Annotated[MaterialLaw | None, partial(require_law, interaction=True)] = None
     shape: Instance[Shape | None] = None
-    GA3: Annotated[float | None, require_stiffness] = None
-    EI2: Annotated[float | None, require_stiffness] = None
-    GJ: Annotated[float | None, require_stiffness] = None
-    rhoI2: Annotated[float | None, require_stiffness] = None
+    GA3: PositiveOrNone = None
+    EI2: PositiveOrNone = None
+    GJ: PositiveOrNone = None
+    rhoI2: PositiveOrNone = None
     centroid_only: Switch = False
     shear3: ResultantLaw = None
     twisting: ResultantLaw = None
@@ -196,7 +182,8 @@ class Section(Record):
         shear_factor3: float | None = None, **more: Any,
     ) -> Section:  # fmt: skip
         require_number(shear_factor, "Section: shear_factor", positive=True)
-        require_stiffness(shear_factor3, "Section: shear_factor3")
+        if shear_factor3 is not None:
+            require_number(shear_factor3, "Section: shear_factor3", positive=True)
         if rho is not None:
             require_number(rho, "Section: rho", at_least=0.0)
             more |= {"rhoA": rho * A, "rhoI": rho * I, "rhoI2": (I2 and rho * I2) or None}

@@ -328,3 +328,7 @@ def _require_components(support: Any, name: str, default: object) -> None:
         object.__setattr__(support, name, given)
     if given is not None and np.size(given) != d:
         raise ModelError(f"{support}: {name} = {given} must have {d} components, as the place")
+
+
+SUPPORTS = Clamped, Pinned, Roller, PrescribedDisplacement
+"""All classes of supports."""

@@ -10,21 +10,15 @@ from typing import Annotated, Any, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError, closed, shorten
+from ufl_beam.model import checks
 from ufl_beam.model.bodies import AttachmentPoint, Beams, BodyPoint, Member, Place
-from ufl_beam.model.checks import (
-    require_all,
-    require_count,
-    require_function,
-    require_number,
-    require_text,
-)
 from ufl_beam.model.connector_law import CONTRIBUTIONS
 from ufl_beam.model.functions import TimeFunction, require_time_function
 from ufl_beam.model.records import Record, parameters_by_name
 
 
 def _require_name(name: Any, what: str) -> None:
-    require_text(name, what)
+    checks.require_text(name, what)
     if not name or name in CONTRIBUTIONS:
         raise ModelError(
             f"{what} = {name!r} is empty or a reserved entry of the energy ledger; give the work "
@@ -46,11 +40,13 @@ def _require_numbers(owner: Work | Effect) -> None:
         if callable(value):
             require_time_function(value, what)
         else:
-            require_number(value, what)
+            checks.require_number(value, what)
 
 
 class _WithNumbers(Record):
     """Base of effects at places or along beams, with numbers that may be functions of time."""
+
+    __repr__ = bracketed
 
     def attached_to(self: Any) -> Iterable[AttachmentPoint]:
         """See the base class."""
@@ -61,7 +57,7 @@ class _WithNumbers(Record):
         return (number for number in self.numbers.values() if callable(number))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Work(_WithNumbers):
     """Base of effects along beams, defined by a function that returns a work or energy per length.
 
@@ -77,7 +73,7 @@ class Work(_WithNumbers):
     _: KW_ONLY
     beams: Beams = None
     numbers: Mapping[str, float | TimeFunction] = field(default_factory=dict)
-    degree: Annotated[int, require_count] = 2
+    degree: Annotated[int, checks.require_count] = 2
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -87,7 +83,7 @@ class Work(_WithNumbers):
                 raise ModelError(
                     f"{self}: numbers[{name!r}]: the name has a meaning already; take another name"
                 )
-        require_function(self.density, f"{self}: density", ", ".join(self.arguments))
+        checks.require_function(self.density, f"{self}: density", ", ".join(self.arguments))
         parameters = self.used_arguments
         for name in self.numbers:
             if name not in parameters:
@@ -126,7 +122,7 @@ class Work(_WithNumbers):
 
 
 @closed("give it a function of your own")
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VirtualWork(Work):
     """Virtual work of a distributed effect, written in UFL.
 
@@ -174,11 +170,9 @@ class VirtualWork(Work):
 
     arguments = ("q0", "q1", "q", "v", "w", "axis", "t", "dt")
 
-    __repr__ = bracketed
-
 
 @closed("give it a function of your own")
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Potential(Work):
     """Potential energy of a distributed effect, written in UFL.
 
@@ -210,8 +204,6 @@ class Potential(Work):
 
     arguments = ("q", "axis", "t")
 
-    __repr__ = bracketed
-
 
 def _require_statement(statement: Any, what: str) -> None:
     kind = type(statement)
@@ -228,7 +220,7 @@ def _require_statement(statement: Any, what: str) -> None:
 
 
 @closed("give it a statement of your own")
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Effect(_WithNumbers):
     """Effect of a user, by a :class:`Statement`: at places, or along beams.
 
@@ -271,12 +263,12 @@ class Effect(_WithNumbers):
 
     statement: Annotated[Any, _require_statement]
     _: KW_ONLY
-    places: Annotated[Sequence[AttachmentPoint], partial(require_all, kind=(Place, BodyPoint))] = ()
+    places: Annotated[
+        Sequence[AttachmentPoint], partial(checks.require_all, kind=(Place, BodyPoint))
+    ] = ()
     beams: Beams = None
     numbers: Mapping[str, float | TimeFunction] = field(default_factory=dict)
-    degree: Annotated[int, require_count] = 2
-
-    __repr__ = bracketed
+    degree: Annotated[int, checks.require_count] = 2
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -104,37 +104,30 @@ def function_name(function: Any) -> str:
     return str(getattr(function, "__qualname__", type(function).__qualname__))
 
 
-MODEL = import_module("ufl_beam.model").__path__
-# Dataclasses of the model, by name
-RECORDS: dict[str, type] = {
-    name: kind
-    for module in iter_modules(MODEL, "ufl_beam.model.")
-    for name, kind in vars(import_module(module.name)).items()
-    if isinstance(kind, type) and dataclasses.is_dataclass(kind)
-}
-RECORDS |= {kind.__name__: kind for kind in (SavedFunction, SavedCurve, LostFunction)}
-STRUCTURES = "ufl_beam.structures"
 # Objects that all scenes share
 KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": RIGID, "steady": steady, "still": still}
+
+PACKAGES = "ufl_beam.model", "ufl_beam.structures"
+"""Subpackages with the classes of objects in files; they are imported when they are needed."""
 
 
 def is_record(kind: type) -> bool:
     """Return whether files have objects of a class: dataclasses of the model, and further laws."""
-    further = kind.__module__.startswith(f"{STRUCTURES}.") and issubclass(kind, Record)
-    return further or RECORDS.get(kind.__name__) is kind
-
-
-def record_class(name: str) -> type:
-    """Return the class of objects in files; a law of ``ufl_beam.structures`` is imported."""
-    return RECORDS[name] if name in RECORDS else _further_records()[name]
+    package = kind.__module__.rpartition(".")[0]
+    known = package in PACKAGES[:1] or (package in PACKAGES and issubclass(kind, Record))
+    return dataclasses.is_dataclass(kind) and (known or kind.__module__ == __name__)
 
 
 @cache
-def _further_records() -> dict[str, type]:
-    places = import_module(STRUCTURES).__path__
-    modules = [import_module(x.name) for x in iter_modules(places, f"{STRUCTURES}.")]
-    kinds = (kind for module in modules for kind in vars(module).values())
-    return {x.__name__: x for x in kinds if isinstance(x, type) and is_record(x)}
+def record_class(name: str) -> type:
+    """Return a class of objects in files by its name."""
+    for package in PACKAGES:
+        places = import_module(package).__path__
+        modules = [import_module(x.name) for x in iter_modules(places, f"{package}.")]
+        for known in (globals(), *map(vars, modules)):
+            if isinstance(kind := known.get(name), type) and is_record(kind):
+                return kind
+    raise KeyError(name)
 
 
 def to_data(value: Any, sampling: Sampling | None = None) -> Data:

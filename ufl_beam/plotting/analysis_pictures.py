@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import cycle, product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,11 +13,7 @@ from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError
 from ufl_beam.plotting import notebook, style
-from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, RED, Axes, Figure, shade
 
 LEAST_ERROR = 1e-12  # ratio of error to tolerance at which all smaller ratios are drawn
 
@@ -37,7 +32,7 @@ def draw_study(study: Study) -> Figure:
     if not varied or not study.results:
         raise ArgumentError("plot: the study has no results over numbers of its cases")
     rows, columns = len(study.results), len(varied)
-    with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
+    with style.picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
         panels_of = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
         for panels, (result, values) in zip(panels_of, study.results.items(), strict=True):
             sizes = np.abs(values.reshape(len(study), -1)).max(axis=1)
@@ -58,7 +53,7 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     """
     errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
     with style.panel(ax, (9.0, 6.0)) as axes:
-        looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
+        looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, style.PINK, style.SKY)))
         for family, (name, look) in enumerate(zip(tradeoff.families, looks, strict=False)):
             marker, color = look
             runs = [run for run in tradeoff.runs if run.refinement.family == family]

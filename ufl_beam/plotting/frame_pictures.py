@@ -7,7 +7,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,26 +24,16 @@ from ufl_beam.plotting.inelastic_pictures import (
     open_hinges,
 )
 from ufl_beam.plotting.labels import Label, around, arrange, fitted_canvas, scene_axes
-from ufl_beam.plotting.positions import (
-    Canvas,
-    DeformedShape,
-    joined,
-    normal,
-    unit_vectors,
-)
-from ufl_beam.plotting.style import BLUE, GREY, INK, RED, font_size, shade
-from ufl_beam.plotting.symbols import draw_strokes
+from ufl_beam.plotting.positions import Canvas, DeformedShape, joined, normal, unit_vectors
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, Artist, Axes, Figure, font_size, shade
+from ufl_beam.plotting.symbols import Stroke, draw_strokes
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 LEAST_STRAIN = 1e-10  # strain up to which section forces count as round-off and are not drawn
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # values above this fraction of the peak of an area count as equal to the peak
 LABELLED = 0.15  # peaks above this fraction of the largest value are labelled
+ALPHA = "48"  # opacity of areas, of 256; hexadecimal
 MOST_BEAMS = 60  # number of beams beyond which only extremes are labelled, without directions
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
@@ -171,48 +161,39 @@ def _draw_diagrams(
         The peak of each area, its point on the axis, and the vector from this point to the diagram;
         (num_areas, 5 or 7).
     """
-    from matplotlib.collections import PolyCollection
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    in_space = solution.scene.in_space
-    cells_of = [solution.numbering.cells_of(beam) for beam, _ in diagrams]
-    cells = np.concatenate(cells_of)
-    vectors = np.concatenate([values for _, values in diagrams])
-    values = vectors[:, 0] if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)
-    points, largest = len(values) // len(cells), float(np.abs(values).max())
+    in_space, numbering = solution.scene.in_space, solution.numbering
+    unmarked = {beam for beam, _ in diagrams}
+    if what == "N" or len(unmarked) > MOST_BEAMS or in_space:
+        unmarked.clear()
+    largest = max(float(np.linalg.norm(vectors, axis=1).max()) for _, vectors in diagrams)
     scale = 0.13 * math.hypot(*np.ptp(shape.nodes, axis=0)) / largest
-    drawn = np.abs(values) > DRAWN_AS_ZERO * largest
-    values = np.where(drawn, values, 0.0)
-    # A beam may have several diagrams, which are not connected.
-    diagram = np.repeat(np.arange(len(diagrams)), [len(beam_cells) for beam_cells in cells_of])
-    axis, left = _along(solution, cells, diagram, shape.nodes, points)
-    if in_space:
-        fractions = np.linspace(0.0, 1.0, points).astype(float)
-        frames = shape.section_axes(fractions)[cells].reshape(-1, 3, 3)
-        ways = np.einsum("pik,ck->pci", frames, ORDINATES[style.COLUMNS[what]])
-    else:
-        ways = left[:, None] * (-1.0 if what == "M" else 1.0)
-    ordinates = scale * np.einsum("pc,pci->pi", np.where(drawn[:, None], vectors, 0.0), ways)
+    points = len(diagrams[0][1]) // len(numbering.cells_of(diagrams[0][0]))  # in a cell
+    fractions = np.linspace(0.0, 1.0, points).astype(np.float64)
+    frames = shape.section_axes(fractions) if in_space else np.empty(0)
     rows: list[Array] = []
-    outlines: defaultdict[str, list[Array]] = defaultdict(list)
-    diagram = np.repeat(diagram, points)
-    for outline, peak, k in _areas(axis, axis + ordinates, values, diagram):
-        outlines[RED if peak > 0 else BLUE].append(outline)
-        rows.append(np.array([peak, *axis[k], *ordinates[k]]))
-    firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
-    if what != "N" and len(firsts) <= MOST_BEAMS and not in_space:
-        for k in firsts.values():
-            first, *_, last = np.flatnonzero(diagram == k)
-            low, high = (first + last) // 2, (first + last + 1) // 2
-            (x, y), (across, up) = (axis[low] + axis[high]) / 2, left[high]
-            angle = math.degrees(math.atan2(up, across)) - 180.0  # at 0 the marker points up
-            axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
-    for color, group in outlines.items():
-        look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
-        kind = Poly3DCollection if in_space else PolyCollection
-        axes.add_collection(kind(group, **look, linewidths=1.0, zorder=2))
+    outlines: defaultdict[str, list[Stroke]] = defaultdict(list)
+    for beam, vectors in diagrams:
+        cells = numbering.cells_of(beam)
+        axis, left = _along(solution, cells, shape.nodes, fractions)
+        values = vectors[:, 0] if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)
+        drawn = np.abs(values) > DRAWN_AS_ZERO * largest
         if in_space:
-            axes.auto_scale_xyz(*np.concatenate(group).T, had_data=True)
+            across = ORDINATES[style.COLUMNS[what]]
+            ways = np.einsum("pik,ck->pci", frames[cells].reshape(-1, 3, 3), across)
+        else:
+            ways = left[:, None] * (-1.0 if what == "M" else 1.0)
+        ordinates = scale * np.einsum("pc,pci->pi", np.where(drawn[:, None], vectors, 0.0), ways)
+        for outline, peak, k in _areas(axis, axis + ordinates, np.where(drawn, values, 0.0)):
+            color = RED if peak > 0 else BLUE
+            outlines[color].append(Stroke(outline, color, 1.0, f"{color}{ALPHA}", 2.0))
+            rows.append(np.array([peak, *axis[k], *ordinates[k]]))
+        if beam in unmarked:
+            unmarked.remove(beam)
+            low, high = (len(axis) - 1) // 2, len(axis) // 2
+            (x, y), (right, up) = (axis[low] + axis[high]) / 2, left[high]
+            angle = math.degrees(math.atan2(up, right)) - 180.0  # at 0 the marker points up
+            axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
+    draw_strokes(axes, outlines)
     return np.array(rows)
 
 
@@ -242,51 +223,35 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Label]:
     ]
 
 
-def _along(
-    solution: Solution, cells: Index, diagram: Index, nodes: Array, points: int
-) -> tuple[Array, Array]:
-    """Return points of the drawn axes and vectors to their left; both (num_cells points, 2 or 3).
-
-    ``diagram`` has the number of each cell's diagram, ``points`` is the number of points of a cell.
-    """
-    mesh, fractions = solution.numbering.mesh, np.linspace(0.0, 1.0, points)
-    lines = nodes[solution.numbering.nodes_along_cells[cells]]
+def _along(solution: Solution, cells: Index, nodes: Array, fractions: Array) -> tuple[Array, Array]:
+    """Return points of the drawn axis of a beam and vectors to its left; (n, 2 or 3) each."""
+    mesh, lines = solution.numbering.mesh, nodes[solution.numbering.nodes_along_cells[cells]]
     ahead = unit_vectors(mesh.slopes(fractions) @ lines)
     # Ordinates at corners between cells of a beam bisect the angle; ordinates near a corner lean
     # towards the bisector.
     lean = np.zeros((len(lines), 2, nodes.shape[1]))
-    k = np.flatnonzero(diagram[:-1] == diagram[1:])
-    half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
-    lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
+    half = unit_vectors(ahead[:-1, -1] + ahead[1:, 0])
+    lean[:-1, 1], lean[1:, 0] = half - ahead[:-1, -1], half - ahead[1:, 0]
     ahead = ahead + np.column_stack([1.0 - fractions, fractions]) @ lean
-    left = normal(unit_vectors(ahead))
-    axis = mesh.weights(fractions) @ lines
+    axis, left = mesh.weights(fractions) @ lines, normal(unit_vectors(ahead))
     return axis.reshape(-1, nodes.shape[1]), left.reshape(-1, nodes.shape[1])
 
 
-def _areas(
-    axis: Array, tips: Array, values: Array, diagram: Index
-) -> Iterator[tuple[Array, float, int]]:
-    """Divide diagrams into areas of one sign; ``diagram`` has the number of each point's diagram.
+def _areas(axis: Array, tips: Array, values: Array) -> Iterator[tuple[Array, float, int]]:
+    """Divide a diagram into areas of one sign.
 
     Yields:
         Outline (n, 2 or 3), m, of an area; its value of the largest magnitude; index of the point
         with this value, the middle one of several.
     """
-    d, points = (
-        axis.shape[1],
-        np.column_stack([axis, tips, values, diagram, np.arange(len(values))]),
-    )
     # Where the sign changes, both areas end at a point on the axis.
-    first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
+    first = np.flatnonzero(values[:-1] * values[1:] < 0.0)
     fraction = values[first] / (values[first] - values[first + 1])
-    zeros = points[first]
-    zeros[:, :d] += fraction[:, None] * (axis[first + 1] - axis[first])
-    zeros[:, d : 2 * d], zeros[:, 2 * d] = zeros[:, :d], 0.0
-    points = np.insert(points, first + 1, zeros, axis=0)
-    axis, tips = points[:, :d], points[:, d : 2 * d]
-    values, diagram, places = points[:, 2 * d :].T
-    signs = np.where(diagram[:-1] == diagram[1:], np.sign(values[:-1] + values[1:]), 0.0)
+    zeros = axis[first] + fraction[:, None] * (axis[first + 1] - axis[first])
+    axis, tips = (np.insert(x, first + 1, zeros, axis=0) for x in (axis, tips))
+    places = np.insert(np.arange(len(values)), first + 1, first)
+    values = np.insert(values, first + 1, 0.0)
+    signs = np.sign(values[:-1] + values[1:])
     ends = np.flatnonzero(np.diff(signs, append=np.nan))
     for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
         if (sign := signs[begin]) != 0.0:

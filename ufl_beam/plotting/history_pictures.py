@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError, require_all, require_number, require_row
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Place
 from ufl_beam.output.extremes import Extremes
+from ufl_beam.output.history import MOTION
 from ufl_beam.plotting import notebook, style, symbols
 from ufl_beam.plotting.frame_pictures import (
     Values,
@@ -31,13 +32,9 @@ from ufl_beam.plotting.labels import (
     set_up_in_space,
 )
 from ufl_beam.plotting.positions import PICTURE, evenly
-from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, picture, shade
+from ufl_beam.plotting.style import BLUE, GREY, INK, RED, SKY, Axes, Figure, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 def _components(names: Sequence[str], rotations: Sequence[str]) -> dict[str, tuple[str, str]]:
@@ -53,7 +50,7 @@ def _components(names: Sequence[str], rotations: Sequence[str]) -> dict[str, tup
     }  # fmt: skip
 
 
-COMPONENTS = {2: _components("uv", ["psi"]), 3: _components("uvw", ["rx", "ry", "rz"])}
+COMPONENTS = {d: _components(names[:d], names[d:]) for d, names in MOTION.items()}
 """Components of motions by the number of displacements; rx, ry, rz: of the rotation vector."""
 
 MOST_MODES, NUM_SHAPES = 6, 5  # numbers of modes, and of shapes of a solution, in a notebook

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,14 +21,8 @@ from ufl_beam.output.history import breaking_law
 from ufl_beam.output.state_rows import HINGE, JUMP
 from ufl_beam.plotting import style
 from ufl_beam.plotting.positions import DeformedShape, unit_vectors
-from ufl_beam.plotting.style import BLUE, INK, ORANGE, RED, WHITE, shade, with_unit
+from ufl_beam.plotting.style import BLUE, INK, ORANGE, WHITE, Artist, Axes, Figure, shade
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 FULLY_OPEN = 0.99  # hinges that dissipated this fraction of their fracture energy look like joints
 
@@ -193,10 +187,10 @@ def draw_hinge(solution: Solution, place: Place | Connector, *, ax: Axes | None 
         _draw_path(axes, ax, solution, jump, M)
         rotation = "rotation" if isinstance(place, Connector) else "jump of rotation"
         style.label_axis(axes.xaxis, jump, rotation, "rad")
-        spent = f"{with_unit(lost, 'J')} dissipated"
+        spent = f"{style.with_unit(lost, 'J')} dissipated"
         if law is not None and math.isfinite(law.fracture_energy):
             whole = law.fracture_energy
-            spent += f", {100 * lost / whole:.3g} % of {with_unit(whole, 'J')}"
+            spent += f", {100 * lost / whole:.3g} % of {style.with_unit(whole, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left")
     return style.parent_figure(axes)
 
@@ -220,7 +214,9 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
         # These colours repeat; blue is reserved for the energy in the scene.
-        colors = [(color, 0.75) for color in (ORANGE, RED, style.GREEN, style.PINK, style.SKY)]
+        colors = [
+            (color, 0.75) for color in (ORANGE, style.RED, style.GREEN, style.PINK, style.SKY)
+        ]
         labels = [f"lost: {name}" for name in energy.lost]
         axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
         label = "at the start, and supplied" if start else "supplied"
@@ -230,7 +226,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
         worst = rf"${digits}\times10^{{{int(power)}}}$"
-        through = with_unit(energy.energy_transferred, "J")
+        through = style.with_unit(energy.energy_transferred, "J")
         axes.set_title(f"worst imbalance {worst} of {through} transferred", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.parent_figure(axes)

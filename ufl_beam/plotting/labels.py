@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,19 +15,8 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.states import States
 from ufl_beam.plotting import style
-from ufl_beam.plotting.positions import (
-    FROM_A_SIDE,
-    PICTURE,
-    Canvas,
-    directions,
-    joined,
-    segments,
-)
-from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, font_size, shade
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.text import Annotation
+from ufl_beam.plotting.positions import FROM_A_SIDE, PICTURE, Canvas, directions, joined, segments
+from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, Annotation, Axes, font_size, shade
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Space for words and numbers around the axes, least size and largest size of a figure; inch."""
@@ -60,7 +49,10 @@ def scene_axes(ax: Axes | None, scene: Scene, title: str) -> Iterator[Any]:
         if scene.in_space:
             set_up_in_space(axes, title)
         else:
-            style.plane_axes(axes, title)
+            axes.set(xlabel="x (m)", ylabel="y (m)")
+            axes.set_aspect("equal", adjustable="datalim")
+            axes.margins(0.06, 0.10)
+            axes.set_title(title, loc="left", wrap=True)
         yield axes
 
 

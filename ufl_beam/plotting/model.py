@@ -12,7 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -48,16 +48,14 @@ from ufl_beam.plotting.style import (
     RED,
     TEXT,
     WHITE,
+    Axes,
+    Figure,
     font_size,
     number,
     shade,
     with_unit,
 )
 from ufl_beam.plotting.symbols import FRONT, Stroke, disc, draw_strokes
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 KINDS = (
     "forces", "moments", "line loads", "imposed strains", "motions", "velocities", "masses",

@@ -6,15 +6,11 @@ from __future__ import annotations
 from base64 import b64encode
 from collections.abc import Callable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.display import Tabular, html_page
-from ufl_beam.plotting.style import png
+from ufl_beam.plotting.style import Figure, png
 from ufl_beam.terms.energy_ledger import Energy
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ROWS = 12  # largest number of cases of a study in a table
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
@@ -24,18 +24,11 @@ from ufl_beam.plotting.history_pictures import (
     draw_modes,
     draw_shapes,
 )
-from ufl_beam.plotting.inelastic_pictures import (
-    draw_dissipation,
-    draw_hinge,
-    draw_moment_curvature,
-)
+from ufl_beam.plotting.inelastic_pictures import draw_dissipation, draw_hinge, draw_moment_curvature
 from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.section_pictures import draw_section
-from ufl_beam.plotting.style import COLUMNS, COMPONENTS, RESULTANTS
+from ufl_beam.plotting.style import COLUMNS, COMPONENTS, RESULTANTS, Figure
 from ufl_beam.simulation.solution import Solution
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Scene: {"model": draw_model},

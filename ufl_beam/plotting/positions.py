@@ -179,9 +179,8 @@ class Canvas:
     def travels(self) -> dict[Connector, Range]:
         """Ranges of sliders and guided points at the shown times and in the undeformed state.
 
-        The keys are the connectors that constrain motions across rails and guide curves.  A range
-        on a rail is in positions, m.  A range on a guide curve is in parameters, extended by three
-        units at ends where the curve goes on.
+        The keys are the connectors that hold the points on rails, with positions (m), and on guide
+        curves, with parameters of the curve, which are extended by three units.
         """
         ranges: dict[Connector, Range] = {}
         solution, shown = self.solution, list(self.shown)

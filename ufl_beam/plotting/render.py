@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Collection, Generator, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
 from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, require_place
-from ufl_beam.model.records import Record
+from ufl_beam.model.records import PositiveOrNone, Record
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.films import WRITERS, Film, screen
@@ -34,7 +34,6 @@ from ufl_beam.plotting.positions import (
     picture_axes,
     unit_vectors,
 )
-from ufl_beam.plotting.solids_in_space import PIN, beams_in_space, others_in_space
 from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin, disc
 from ufl_beam.simulation.solution import Solution
 
@@ -42,8 +41,15 @@ QUANTITIES = {**{name: style.resultant(name) for name in "NVM"}, "rotation": ("r
 QUANTITIES_IN_SPACE = {name: style.resultant(name) for name in "NVTM"}
 UP = np.array([0.0, 1.0, 0.0])  # upwards in the picture; the scene is in the plane of x and y
 FROM_THE_FRONT = (-0.20, -0.28, -1.0)  # view direction
+PIN = "#707070"  # colour of joints
+SLENDER = 0.012  # least size of a drawn cross-section in space, as a part of the scene's size
+ROUND = 20  # number of points of an outline in space from which it is drawn as a ball
+
+SQUARE = (1, 1), (-1, 1), (-1, -1), (1, -1)  # corners of a cross-section, as fractions of its size
 
 Direction = tuple[float, float, float]
+Meshes = defaultdict[str, list[Any]]  # by colour
+Lines = defaultdict[tuple[str, float], list[Array]]  # by colour and width
 
 
 def _require_direction(value: Any, what: str) -> Direction | None:
@@ -83,7 +89,7 @@ class Camera(Record):
 
     direction: Annotated[Direction | None, _require_direction] = None
     follow: Annotated[AttachmentPoint | None, require_place] = None
-    width: Annotated[float | None, partial(require_number, positive=True)] = None
+    width: PositiveOrNone = None
 
     def axes(self, in_space: bool) -> tuple[Array, Array]:
         """Return the view direction, of length 1, and the direction that is upwards; (3,)."""
@@ -376,16 +382,21 @@ class Solids:
         return np.linalg.norm(forces, axis=2) if self.magnitudes else forces[:, :, 0]
 
     def beams(self, n: int, shape: DeformedShape, factor: float) -> Any:
-        """Make a hexahedron for each cell of the beams, with values that colours show.
+        """Make a hexahedron for each cell of the beams, with values that colours show."""
+        from pyvista import CellType, UnstructuredGrid
+
+        corners = self.corners_in_space(shape) if self.in_space else self.corners(n, shape)
+        points = corners.reshape(-1, 3)  # for each cell, as values may jump
+        hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
+        mesh = UnstructuredGrid(hexahedra, points)
+        mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
+        return mesh
+
+    def corners(self, n: int, shape: DeformedShape) -> Array:
+        """Return corners of cross-sections at both ends of cells; (num_cells, 2, 4, 3); m.
 
         Cross-sections rotate with ψ.  At corners between cells of a beam they bisect the angle.
         """
-        from pyvista import CellType, UnstructuredGrid
-
-        if self.in_space:
-            mesh = beams_in_space(self.solution, shape, self.thickness)
-            mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
-            return mesh
         numbering = self.solution.numbering
         vertices = np.arange(numbering.cells.max(initial=-1) + 1)
         along = unit_vectors(np.diff(numbering.points[numbering.cells], axis=1)[:, 0])
@@ -397,30 +408,47 @@ class Solids:
         angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][numbering.dofs[vertices, 2]]
         depth, width = halves.T
         left = depth[:, None] * normal(directions(angle))
-        corners = np.stack(  # of cross-sections; (num_vertices, 4, 3)
-            [
-                np.column_stack([shape.nodes[vertices] + sign * left, side * width])
-                for sign, side in ((1, 1), (-1, 1), (-1, -1), (1, -1))
-            ],
-            axis=1,
-        )
-        points = corners[numbering.cells].reshape(-1, 3)  # for each cell, as values may jump
-        hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
-        mesh = UnstructuredGrid(hexahedra, points)
-        mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
-        return mesh
+        corners = [
+            np.column_stack([shape.nodes[vertices] + sign * left, side * width])
+            for sign, side in SQUARE
+        ]
+        return np.stack(corners, axis=1)[numbering.cells]
+
+    def corners_in_space(self, shape: DeformedShape) -> Array:
+        """Return the same in space, where cells turn and twist with their nodes.
+
+        Beams have the depth of the section, and the width of a rectangle with its bending
+        stiffnesses.
+        """
+        numbering, size = self.solution.numbering, self.solution.scene.size
+        halves = []
+        for section in (beam.section for beam in self.solution.scene.beams):
+            aspect = np.sqrt(float(section.EI2 or 0.0) / section.EI)
+            depth = max(self.thickness * section.depth, SLENDER * size * max(1.0, 1 / aspect))
+            halves.append((depth / 2, max(depth * aspect, SLENDER * size) / 2))
+        of_cells = np.reshape(halves, (-1, 2))[numbering.beam_of_cell]
+        across = shape.section_axes(np.array([0.0, 1.0]))[..., 1:]  # (num_cells, 2, 3, 2)
+        corners = np.einsum("neik,ck,nk->neci", across, np.array(SQUARE), of_cells)
+        return np.asarray(shape.nodes[numbering.cells][:, :, None] + corners)
 
     def others(self, n: int, shape: DeformedShape) -> dict[str, list[Any]]:
         """Make meshes of bodies, joints, connectors, masses and supports, by their colours.
 
-        Filled areas are blocks, and lines are rods.
+        In the plane filled areas are blocks; in space they are balls and plates.  Lines are rods.
         """
-        if self.in_space:
-            return others_in_space(shape)
+        meshes: defaultdict[str, list[Any]] = defaultdict(list)
+        lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
+        (self._add_in_space if self.in_space else self._add)(n, shape, meshes, lines)
+        for (color, weight), several in lines.items():
+            radius = weight * shape.canvas.unit / 20.0
+            meshes[color].append(_lines(several).tube(radius=radius, n_sides=12))
+        return meshes
+
+    def _add(self, n: int, shape: DeformedShape, meshes: Meshes, lines: Lines) -> None:
+        """Add blocks and lines of a scene in the plane."""
         scene, unit = self.solution.scene, shape.canvas.unit
         body, front = self.thickest(())[1], 0.7 * self.thickest(scene.beams)[1]
         blocks: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
-        lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
         for strokes, half in (
             (symbols.bodies(shape), 0.4 * body),
             (symbols.centres(shape), 0.48 * body),
@@ -450,12 +478,28 @@ class Solids:
         for at, angle, symbol, color, place in symbols.support_symbols(shape):
             half, ahead = 0.6 * self.thickest([place])[1], unit * directions(angle)
             blocks[color, -half, half] += [in_frame(x, at, ahead) for x in symbol]
-        meshes: defaultdict[str, list[Any]] = defaultdict(list)
         for (color, low, high), outlines in blocks.items():
             meshes[color].append(_extruded(outlines, low, high))
-        for (color, weight), several in lines.items():
-            meshes[color].append(_lines(several).tube(radius=weight * unit / 20.0, n_sides=12))
-        return meshes
+
+    def _add_in_space(self, _: int, shape: DeformedShape, meshes: Meshes, lines: Lines) -> None:
+        """Add balls, plates and lines of a scene in space."""
+        from pyvista import PolyData, Sphere
+
+        step = 0.6 * shape.canvas.unit * unit_vectors(FROM_A_SIDE)
+        for group, strokes in symbols.all_symbols(shape).items():
+            for points, color, weight, fill, _layer in strokes:
+                color = PIN if group in ("pins", "joints") and color == style.INK else color
+                if fill is None:
+                    lines[color, weight].append(points)
+                    continue
+                middle, color = points[:-1].mean(axis=0), color if fill == style.WHITE else fill
+                if len(points) > ROUND:
+                    radius = float(np.linalg.norm(points[0] - middle))
+                    meshes[color].append(Sphere(radius=radius, center=middle))
+                else:
+                    corners = points[:-1] - step / 2
+                    plate = PolyData(corners, [len(corners), *range(len(corners))])
+                    meshes[color].append(plate.triangulate().extrude(step, capping=True))
 
 
 def _lines(lines: list[Array]) -> Any:
@@ -463,8 +507,9 @@ def _lines(lines: list[Array]) -> Any:
     from pyvista import line_segments_from_points
 
     ends = np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])
-    flat = ends.shape[1] == 2
-    return line_segments_from_points(np.insert(ends, 2, 0.0, axis=1) if flat else ends)
+    ends = np.insert(ends, 2, 0.0, axis=1) if ends.shape[1] == 2 else ends
+    long = np.abs(ends[1::2] - ends[::2]).max(axis=1) > 1e-9 * np.ptp(ends)  # others have no tube
+    return line_segments_from_points(ends[np.repeat(long, 2)])
 
 
 def _extruded(outlines: Sequence[Array], low: float, high: float) -> Any:

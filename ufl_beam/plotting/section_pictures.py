@@ -3,18 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ufl_beam.errors import ArgumentError
 from ufl_beam.model.sections import Section
 from ufl_beam.plotting import style
-from ufl_beam.plotting.style import BLUE, INK, ORANGE, shade, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from ufl_beam.plotting.style import BLUE, INK, ORANGE, Axes, Figure, shade, with_unit
 
 MM = 1e3
 

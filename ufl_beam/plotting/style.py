@@ -20,10 +20,13 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
+    from matplotlib.artist import Artist as Artist
+    from matplotlib.axes import Axes as Axes
     from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.text import Annotation as Annotation
+else:
+    Artist = Axes = Axis = Figure = Annotation = Any
 
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PINK, ORANGE, SKY = (
@@ -211,14 +214,6 @@ def shade(color: str) -> str:
     if now["text.color"] != INK:
         chosen |= dict.fromkeys((INK, TEXT), now["text.color"])
     return str(chosen.get(color, color))
-
-
-def plane_axes(axes: Axes, title: str) -> None:
-    """Set up axes of the plane of motion with one scale for x and y."""
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.06, 0.10)
-    axes.set_title(title, loc="left", wrap=True)
 
 
 def time_axes(axes: Axes) -> Axes:

@@ -12,7 +12,7 @@ import math
 import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,10 +31,7 @@ from ufl_beam.plotting.positions import (
     normal,
     unit_vectors,
 )
-from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, Axes, number, shade, with_unit
 
 # Layers: below the beams, above the beams, on areas in the layer MIDDLE, pins, above pins.
 BEHIND, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
