@@ -5,86 +5,33 @@ import re
 
 import numpy as np
 import pytest
+from into_space import EXACT, SKEW, same_in_space
 from scipy.spatial.transform import Rotation
 
 import ufl_beam as ub
 
-EXACT = ub.Newton(rtol=1e-13)
 STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
 OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
-TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
-SECTION = ub.Section(**STIFF, **OTHER)
-
-
-def flat(x, y):
-    return (x, y)
-
-
-def skew(x, y):
-    return tuple(TURN.apply([x, y, 0.0]))
-
-
-def normal(at, size=1.0):
-    """A vector across the plane of a scene in space, or the number of the plane."""
-    return size if at is flat else tuple(TURN.apply([0.0, 0.0, size]))
-
-
-def driven(at, more):
-    """A frame whose foot moves and turns as functions of time, on a roller at an angle."""
-    up = {} if at is flat else {"up": normal(at)}
-    turning = {} if at is flat else {"axis": normal(at), "w": 0.0}
-    section = ub.Section(**STIFF) if at is flat else SECTION
-    sides = [{}, {}] if at is flat else [{"up": at(-3, 4)}, {"up": at(0, 1)}]
-    post = ub.Beam(at(0, 0), at(4, 3), section, cells=4, **sides[0])
-    girder = ub.Beam(at(4, 3), at(7, 3), section, cells=3, **sides[1])
-    foot = ub.PrescribedDisplacement(
-        post.start, u=lambda t: 0.3 * np.sin(2 * t), v=lambda t: 0.1 * t, psi=lambda t: 1.5 * t * t,
-        along=at(3, 4), **up, **turning,
-    )  # fmt: skip
-    return ub.Scene(
-        [post, girder], joints=[ub.Rigid(post.end, girder.start)],
-        supports=[foot, ub.Roller(girder.end, along=at(2, 1)), *more(post, girder, at)[0]],
-        loads=[ub.Gravity(at(0.5, -1)), *more(post, girder, at)[1]],
-    )  # fmt: skip
-
-
-def both(make, scheme, places, t=1.0, dt=0.1):
-    """Run a scene in the plane and in a skew plane in space, compare them, and return the runs."""
-    runs = [
-        ub.simulate(make(at), scheme, t=(0, t), dt=dt, newton=EXACT, progress=False)
-        for at in (flat, skew)
-    ]
-    size, back = runs[0].scene.size, TURN.inv()
-    for place in places:
-        plane, space = (run.displacement(place(run.scene)) for run in runs)
-        u, rotation = back.apply(space[:, :3]), back.apply(space[:, 3:])
-        assert np.abs(u[:, :2] - plane[:, :2]).max() < 1e-12 * size
-        assert np.abs(u[:, 2]).max() < 1e-12 * size
-        wrapped = Rotation.from_rotvec(plane[:, 2:] * [[0.0, 0.0, 1.0]]).as_rotvec()
-        assert np.abs(rotation - wrapped).max() < 1e-11
-    for one, other in zip(*(run.scene.supports for run in runs), strict=True):
-        plane, space = runs[0].reaction(one)[1:], runs[1].reaction(other)[1:]
-        largest = np.abs(plane).max()
-        force, moment = back.apply(space[:, :3]), back.apply(space[:, 3:])
-        assert np.abs(force[:, :2] - plane[:, :2]).max() < 1e-11 * largest
-        assert np.abs(moment[:, 2] - plane[:, 2]).max() < 1e-11 * largest
-        assert max(np.abs(force[:, 2]).max(), np.abs(moment[:, :2]).max()) < 1e-11 * largest
-    for name, plane in runs[0].energy.supplied.items():
-        space = runs[1].energy.supplied[name]
-        assert np.abs(space - plane).max() < 1e-11 * max(1.0, np.abs(plane).max())
-    return runs
-
-
+SECTION, FLAT = ub.Section(**STIFF, **OTHER), ub.Section(**STIFF)
 SCHEMES = [
     ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.Static(),
     ub.EnergyMomentumStatic(),
 ]  # fmt: skip
-ENDS = [lambda scene: scene.beams[0].start, lambda scene: scene.beams[1].end]
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_driven_frame_equals_the_plane(scheme):
-    both(lambda at: driven(at, lambda *_: ([], [])), scheme, ENDS)
+def driven(loads=lambda post, girder: []):
+    """A frame whose foot moves and turns as functions of time, on a roller at an angle."""
+    post = ub.Beam((0, 0), (4, 3), FLAT, cells=4)
+    girder = ub.Beam((4, 3), (7, 3), FLAT, cells=3)
+    foot = ub.PrescribedDisplacement(
+        post.start, u=lambda t: 0.3 * np.sin(2 * t), v=lambda t: 0.1 * t, psi=lambda t: 1.5 * t * t,
+        along=(3, 4),
+    )  # fmt: skip
+    return ub.Scene(
+        [post, girder], joints=[ub.Rigid(post.end, girder.start)],
+        supports=[foot, ub.Roller(girder.end, along=(2, 1))],
+        loads=[ub.Gravity((0.5, -1)), *loads(post, girder)],
+    )  # fmt: skip
 
 
 AXIS = np.array([1.0, 2.0, -1.0]) / np.sqrt(6)
@@ -242,52 +189,50 @@ def test_start_and_checkpoint_of_a_hinge(psi, shared_path):
         run(4, ub.Scene([beam], supports=[tilted]), begin=2.0, start=first)
 
 
-def following(post, girder, at):
+def following(post, girder):
     """A follower force with a moment, and pressures on a part of a beam and on another beam."""
-    thrust = ub.FollowerLoad(
-        girder.end, force=at(3, 8), moment=normal(at, -20.0), amplitude=lambda t: 1 + t
-    )
-    wind, side = (15.0, 9.0) if at is flat else ((15.0, 0.0), (9.0, 0.0))
-    blow = ub.Pressure(post, normal=wind, tangential=-4.0, span=(0.25, 1.0), profile=(0.5, 2.0))
-    return [], [thrust, blow, ub.Pressure(girder, normal=side, amplitude=lambda t: t)]
+    return [
+        ub.FollowerLoad(girder.end, force=(3, 8), moment=-20.0, amplitude=lambda t: 1 + t),
+        ub.Pressure(post, normal=15.0, tangential=-4.0, span=(0.25, 1.0), profile=(0.5, 2.0)),
+        ub.Pressure(girder, normal=9.0, amplitude=lambda t: t),
+    ]
+
+
+def moves(post, girder):
+    """A force that crosses the joint of two beams, and leaves the second one."""
+    return [ub.MovingLoad([post, girder], lambda t: 9 * t, force=(5, -20))]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_loads_that_follow_equal_the_plane(scheme):
-    both(lambda at: driven(at, following), scheme, ENDS)
+@pytest.mark.parametrize("loads", [lambda *_: [], following, moves])
+def test_a_driven_frame_with_loads_equals_the_plane(loads, scheme):
+    same_in_space(driven(loads), scheme)
 
 
-def with_load_at_arm(at):
-    """A beam with a ball, which a force and a moment at its edge swing."""
-    other = {"GA": 7e3, "GA3": 1e4, "EI": 300.0, "EI2": 500.0, "rhoI": 6.0, "rhoI2": 10.0}
-    section = ub.Section(**STIFF) if at is flat else ub.Section(**STIFF | OTHER | other)
-    up = {} if at is flat else {"up": normal(at)}
-    beam = ub.Beam(at(0, 0), at(2, 0), section, cells=4, **up)
-    ball = ub.Body(at(2.5, 0.3), mass=3.0, inertia=0.7 if at is flat else (0.7, 0.7, 0.7))
-    push = ub.PointLoad(ball.at(*at(3, 1)), force=at(20, 90))
-    # A moment of a body does not depend on its place; in the plane there it has another scheme
-    place = ball.middle if at is flat else ball.at(*at(3, 1))
-    twist = ub.PointLoad(place, moment=normal(at, 30.0))
-    wind = ub.Pressure(beam, normal=-25.0 if at is flat else (0.0, 25.0))  # axis 3 is the right
+def with_ball(loads):
+    """A beam with a ball."""
+    beam = ub.Beam((0, 0), (2, 0), FLAT, cells=4)
+    ball = ub.Body((2.5, 0.3), mass=3.0, inertia=0.7)
     return ub.Scene(
-        [beam], bodies=[ball], joints=[ub.Rigid(beam.end, ball.at(*at(2, 0)))],
-        supports=[ub.Clamped(beam.start)], loads=[push, twist, wind],
+        [beam], bodies=[ball], joints=[ub.Rigid(beam.end, ball.at(2, 0))],
+        supports=[ub.Clamped(beam.start)], loads=loads(beam, ball),
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
-def test_a_load_at_an_arm_equals_the_plane(scheme):
-    both(with_load_at_arm, scheme, [lambda scene: scene.bodies[0].middle])
+def at_an_arm(beam, ball):
+    """A force at the edge of the ball, and a moment, which does not depend on its place."""
+    push, twist = ub.PointLoad(ball.at(3, 1), force=(20, 90)), ub.PointLoad(ball.middle, moment=30)
+    return [push, twist, ub.Pressure(beam, normal=-25.0)]
+
+
+def in_a_frame(beam, ball):
+    return [ub.PointLoad(ball.at(3, 1), force=(20, 90)), ub.RotatingFrame(2.5, about=(-1, 0.5))]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_a_moving_force_equals_the_plane(scheme):
-    """It crosses the joint of two beams, and leaves the second one."""
-
-    def moves(post, girder, at):
-        return [], [ub.MovingLoad([post, girder], lambda t: 9 * t, force=at(5, -20))]
-
-    both(lambda at: driven(at, moves), scheme, ENDS)
+@pytest.mark.parametrize("loads", [at_an_arm, in_a_frame])
+def test_loads_of_a_ball_equal_the_plane(loads, scheme):
+    same_in_space(with_ball(loads), scheme)
 
 
 @pytest.mark.parametrize("kind", [ub.PointLoad, ub.FollowerLoad])
@@ -296,8 +241,9 @@ def test_work_of_a_moment_in_statics(kind):
 
     Also after a continued run, whose first step begins with the last moment.
     """
-    beam = ub.Beam(skew(0, 0), skew(3, 1), SECTION, cells=8, up=skew(-1, 3))
-    bend = kind(beam.end, moment=normal(skew, 300.0), amplitude=lambda t: t)
+    end, up, moment = map(tuple, SKEW.apply([(3, 1, 0), (-1, 3, 0), (0, 0, 300.0)]))
+    beam = ub.Beam((0, 0, 0), end, SECTION, cells=8, up=up)
+    bend = kind(beam.end, moment=moment, amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[bend])
     first = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
     assert first.energy.worst < 1e-14
@@ -391,19 +337,6 @@ def test_a_machine_balances_and_restarts(shared_path):
     assert np.abs(second.displacement(wheel) - whole.displacement(wheel)[32:]).max() < 1e-10
 
 
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_a_rotating_frame_equals_the_plane(scheme):
-    def make(at):
-        part = with_load_at_arm(at)
-        frame = ub.RotatingFrame(normal(at, 2.5), about=at(-1, 0.5))
-        return ub.Scene(
-            part.beams, bodies=part.bodies, joints=part.joints, supports=part.supports,
-            loads=[*part.loads[:1], frame],
-        )  # fmt: skip
-
-    both(make, scheme, [lambda scene: scene.bodies[0].middle])
-
-
 def test_a_flight_seen_from_a_rotating_frame():
     """A bent beam with a spinning wheel, in a frame that turns: the errors are of second order.
 
@@ -475,7 +408,7 @@ def test_whirling_of_a_shaft():
 
 
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), SECTION, name="arm")
-PLANAR = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF))
+PLANAR = ub.Beam((0, 0), (1, 0), FLAT)
 MOVED = ub.PrescribedDisplacement
 WRONG = {
     "roller of the plane": (lambda: ub.Roller(BEAM.end, along=(1, 1)), "must have 3 components"),

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from test_space import EXACT, KINDS, LAWS, OTHER, STIFF, TURNS, bend, crane, in_space
+from into_space import EXACT
+from test_space import KINDS, LAWS, OTHER, STIFF, bend, crane, in_space
 
 import ufl_beam as ub
 
@@ -13,7 +14,7 @@ PLAIN = ub.Newton(rtol=1e-12, reference=True)
 
 
 def spring(law):
-    return in_space(TURNS[1], connectors=lambda *ends: [KINDS["Slide"](*ends, LAWS[law])])
+    return in_space(connectors=lambda *ends: [KINDS["Slide"](*ends, LAWS[law])])
 
 
 def bent():
@@ -24,8 +25,8 @@ def bent():
 
 CASES = {
     "machine": (crane, ub.EnergyMomentum(), 0.2, 0.02),
-    "dissipation": (lambda: in_space(TURNS[1]), ub.EnergyMomentum(0.1, 0.05), 1.0, 0.1),
-    "decaying": (lambda: in_space(TURNS[1]), ub.EnergyMomentumDecaying(), 1.0, 0.1),
+    "dissipation": (in_space, ub.EnergyMomentum(0.1, 0.05), 1.0, 0.1),
+    "decaying": (in_space, ub.EnergyMomentumDecaying(), 1.0, 0.1),
     "stop": (lambda: spring("stop"), ub.EnergyMomentum(), 0.5, 0.1),
     "yielding spring": (lambda: spring("hardening spring"), ub.EnergyMomentum(), 0.5, 0.1),
     "statics": (bent, ub.Static(), 1.0, 0.25), "arc": (lambda: bend(8), ub.Static(), 1.0, 0.25),
