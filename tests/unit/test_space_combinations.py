@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
+from into_space import EXACT
 from test_space_analysis import flat_modes
 from test_space_inelastic import (
-    EXACT,
     OTHER,
     RESULTANTS,
     SIX,
