@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Defects that random combinations in space had, see ``tests/properties``."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from into_space import EXACT
+from into_space import EXACT, SKEW, InSpace, same_in_space
 from test_space_analysis import flat_modes
 from test_space_inelastic import (
     OTHER,
@@ -22,10 +24,6 @@ import ufl_beam as ub
 RUN = {"newton": EXACT, "progress": False}
 YIELDING = RESULTANTS["bending"]
 SECTION = ub.Section(**STIFF, **OTHER)
-
-
-def section(at, **laws):
-    return ub.Section(**STIFF, **({} if at is in_plane else OTHER), **laws)
 
 
 @pytest.mark.parametrize("axes", [{"along": (1, 2, 2)}, {"axis": (0, 0, 1)}], ids=str)
@@ -50,13 +48,10 @@ def test_a_fixed_place_in_turned_axes_stays_after_start(axes):
 
 
 def test_modes_about_a_yielded_state_are_those_of_the_plane():
-    both = []
-    for at in (in_plane, skew):
-        scene = cantilever(section(at, **YIELDING), at, amplitude=lambda t: 3 * t)
-        state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, **RUN)
-        assert state.material(scene.beams[0]).plastic.sum() > 0
-        both.append(ub.modes(scene, 3 if at is in_plane else 12, at=state))
-    plane, space = both
+    column = cantilever(ub.Section(**STIFF, **YIELDING), in_plane, amplitude=lambda t: 3 * t)
+    states = same_in_space(column, ub.Static())
+    assert states[0].energy["plastic"][-1] > 0
+    plane, space = (ub.modes(x.scene, n, at=x) for x, n in zip(states, (3, 12), strict=True))
     found = np.flatnonzero(flat_modes(space))[:3]
     assert np.abs(space.omega[found] / plane.omega - 1).max() < 1e-9
 
@@ -119,16 +114,11 @@ def test_reference_solver_with_friction_by_the_force_of_a_joint():
 
 def test_viscosity_may_begin_with_start():
     """As in the plane, also beside laws."""
-    ends = []
-    for at in (in_plane, skew):
-        scene = cantilever(section(at, **YIELDING), at, amplitude=push)
+    ends, plane = [], cantilever(ub.Section(**STIFF, **YIELDING), in_plane, amplitude=push)
+    for scene in (plane, InSpace(plane, SKEW).scene):
         first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, **RUN)
-        damped = ub.Scene(
-            scene.beams, supports=scene.supports, loads=scene.loads, damping=[ub.KelvinVoigt(0.02)]
-        )
-        second = ub.simulate(
-            damped, ub.EnergyMomentum(), t=(0.5, 1), dt=0.02, start=first, **RUN
-        )  # fmt: skip
+        damped = replace(scene, damping=[ub.KelvinVoigt(0.02)])
+        second = ub.simulate(damped, ub.EnergyMomentum(), t=(0.5, 1), dt=0.02, start=first, **RUN)
         assert second.energy.worst < 1e-12
         assert second.energy["damping"][-1] > 0
         ends.append(second.position(scene.beams[0].end))
