@@ -155,7 +155,7 @@ def test_adjoint_is_the_direct_derivative(seed):
     """Of a random sum of motions at all times, which differences of `of` know to about 1e-9."""
     one, random = case(seed), np.random.default_rng(seed)
     run = {"newton": TIGHT, **one.run}
-    found = ub.differentiate(one.model, {"x": 1.0}, progress=False, **run)
+    found = ub.differentiate(one.model, {"x": 1.0}, **run)
     direct = found.of(lambda s: s.q)[..., 0]
     times = random.normal(size=len(direct))
     dofs = random.choice(direct.shape[1], 3, replace=False)

@@ -75,9 +75,8 @@ def test_an_oscillator_by_the_midpoint_rule():
     """u_n = v0 sin(n φ)/ω with φ = 2 arctan(ω dt/2), the closed form of the midpoint rule."""
     k, m, v0, dt, n = 20.0, 3.0, 0.4, 0.05, np.arange(41)
     run = ub.differentiate(
-        swinging, {"k": k, "m": m, "v0": v0}, ub.EnergyMomentum(),
-        t=(0, 2), dt=dt, **TO_THE_DIGITS,
-    )  # fmt: skip
+        swinging, {"k": k, "m": m, "v0": v0}, ub.EnergyMomentum(), t=(0, 2), dt=dt, **TO_THE_DIGITS
+    )
     ω = math.sqrt(k / m)
     φ, slope = 2 * math.atan(ω * dt / 2), dt / (1 + (ω * dt / 2) ** 2)
     u, v = v0 / ω * np.sin(n * φ), v0 * np.cos(n * φ)

@@ -176,9 +176,7 @@ def pressed_hard(load=60.0, normal=40.0, curvature=2.0, growth=1.0):
     )
 
 
-MODELS = (
-    following, moving, frame, works, effects, imposed, viscous, imposed_on_points, guided,
-)  # fmt: skip
+MODELS = (following, moving, frame, works, effects, imposed, viscous, imposed_on_points, guided)
 ONLY_DYNAMIC = moving_mass, damped, damped_points
 
 
@@ -207,8 +205,7 @@ def test_derivatives_are_those_of_runs(model, scheme):
 
 
 @pytest.mark.parametrize(
-    ("model", "degree"),
-    [(moving_mass, 2), (damped_points, 2), (saturated, 1)],
+    ("model", "degree"), [(moving_mass, 2), (damped_points, 2), (saturated, 1)]
 )
 def test_derivatives_are_those_of_runs_in_curved_cells_and_single_elements(model, degree):
     require_differences_of_runs(model, ub.EnergyMomentum(0.02), 0.6, mesh=ub.Mesh(degree=degree))

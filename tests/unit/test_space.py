@@ -100,7 +100,7 @@ def test_a_slider_that_may_turn_moves_along_and_about_the_axis_only():
     slot = ub.Prismatic(ub.ground(*at), body.middle, axis=axis, turning=True)
     load = ub.PointLoad(body.middle, force=force, moment=moment)
     scene = ub.Scene(bodies=[body], joints=[slot], loads=[load])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT)
     F, M = axis @ force, axis @ moment
     changes = M / J * dt**2 * (np.arange(10) + 0.5)
     turns = np.append(0.0, np.cumsum(2 * np.arctan(changes / 2)))
@@ -120,7 +120,7 @@ def flight():
 
 def test_flight_in_space():
     """Energy and positions at 5 s, computed by a separate program with quaternions and NumPy."""
-    run = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=0.02, progress=False)
+    run = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=0.02)
     (beam,) = run.scene.beams
     assert np.allclose(run.energy.total[-1], 723.36647059, rtol=1e-11)
     moved = run.displacement(beam.start)[-1, :3]
@@ -128,13 +128,8 @@ def test_flight_in_space():
 
 
 def test_restart_in_space_changes_no_bit():
-    whole, first = (
-        ub.simulate(in_space(), ub.EnergyMomentum(), t=(0, t), dt=0.05, progress=False)
-        for t in (2, 1)
-    )
-    second = ub.simulate(
-        first.scene, ub.EnergyMomentum(), t=(1, 2), dt=0.05, start=first, progress=False
-    )
+    whole, first = (ub.simulate(in_space(), ub.EnergyMomentum(), t=(0, t), dt=0.05) for t in (2, 1))
+    second = ub.simulate(first.scene, ub.EnergyMomentum(), t=(1, 2), dt=0.05, start=first)
     for one, other in zip(whole.scene.beams, first.scene.beams, strict=True):
         assert (whole.displacement(one.at(0.3))[-1] == second.displacement(other.at(0.3))[-1]).all()
 
@@ -159,11 +154,9 @@ def test_start_with_a_connector_at_an_arm(law):
         joints=[ub.Revolute(beam.end, wheel.at(2, 1, 0), axis=(0, 0, 1))],
         loads=[ub.Gravity((0, 0, -9.81))],
     )  # fmt: skip
-    whole = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, progress=False)
-    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.05, progress=False)
-    second = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0.5, 1), dt=0.05, start=first, progress=False
-    )
+    whole = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.05)
+    second = ub.simulate(scene, ub.EnergyMomentum(), t=(0.5, 1), dt=0.05, start=first)
     results = (lambda run: run.displacement(wheel.middle)), (lambda run: run.connector(pull).force)
     for result in results:
         there = result(whole)[10:]
@@ -191,7 +184,7 @@ def test_bend_in_statics():
     """
     exact, errors = np.array([47.15010, 15.68469, 53.47548]), []
     for cells in (8, 16):
-        run = ub.simulate(bend(cells), ub.Static(), t=(0, 1), dt=0.25, progress=False)
+        run = ub.simulate(bend(cells), ub.Static(), t=(0, 1), dt=0.25)
         tip = run.position(run.scene.beams[0].end)[-1]
         errors.append(np.linalg.norm(tip - exact))
         foot = run.reaction(run.scene.supports[0])[-1]
@@ -233,7 +226,7 @@ def test_heavy_top():
             loads=[ub.Gravity((0, 0, -g))],
             initial=[ub.Velocity([top], linear=(0, 0, 0), angular=tuple(spin), about=(0, 0, 0))],
         )  # fmt: skip
-        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=dt, progress=False)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=dt)
         path = run.position(top.middle)
         assert np.abs(np.linalg.norm(path, axis=1) - arm).max() < 1e-13
         assert run.energy.worst < 1e-10
@@ -251,13 +244,13 @@ def test_a_revolute_joint_keeps_its_axis():
     still = ub.Velocity([second], linear=spin.at(4, 0, 0)[:3], about=(4, 0, 0), angular=(0, 0, 0.2))
     scene = ub.Scene([first, second], joints=[joint], initial=[spin, still])
     with pytest.raises(ub.ArgumentError, match="would move apart"):
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False)
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1)
     along = np.array(spin.angular) + 0.7 * axis
     turning = ub.Velocity(
         [second], linear=spin.at(4, 0, 0)[:3], about=(4, 0, 0), angular=tuple(along)
     )
     scene = ub.Scene([first, second], joints=[joint], initial=[spin, turning])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 10), dt=0.1, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 10), dt=0.1)
     total = run.energy.total
     assert np.ptp(total) < 1e-11 * total[0]
     axes = [
@@ -278,7 +271,7 @@ def test_section_forces_of_a_cantilever():
     force, moment = 1e-4 * (3.0 * up - 2.0 * third + [0, 5.0, 0]), 1e-4 * np.array([0, 7.0, 0])
     load = ub.PointLoad(beam.end, force=tuple(force), moment=tuple(moment))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
     arm = length - (np.arange(4) + 0.5) * length / 4
     expected = 1e-4 * np.column_stack(
         [np.full(4, 5.0), np.full(4, 3.0), np.full(4, -2.0), np.full(4, 7.0), 2 * arm, 3 * arm]
@@ -295,7 +288,7 @@ def test_velocity_of_a_point_of_a_body():
     point = ball.at(1, 2.5, 2)
     start = ub.Velocity([ball], angular=spin, linear=speed, about=(1, 2, 3))
     scene = ub.Scene(bodies=[ball], initial=[start])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.05, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.05)
     arms = run.position(point) - run.position(ball.middle)
     assert np.abs(run.velocity(point)[:, :3] - speed - np.cross(spin, arms)).max() < 1e-12
     turned = run.displacement(point)[1:, 3:] / run.times[1:, None]
@@ -322,7 +315,7 @@ def test_files_have_the_results(shared_path):
     import h5py
 
     scene, files = crane(), (ub.VTKHDF(shared_path / "a.hdf"), ub.XDMF(shared_path / "a.xdmf"))
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=files, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=files)
     text = (shared_path / "a.xdmf").read_text("utf-8")
     with h5py.File(shared_path / "a.hdf") as file:
         points, cells = file["VTKHDF/PointData"], file["VTKHDF/CellData"]
@@ -350,7 +343,7 @@ def test_rendered_picture(tmp_path, quantity):
     from matplotlib.image import imread
 
     pytest.importorskip("pyvista")
-    run = ub.simulate(crane(), ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, progress=False)
+    run = ub.simulate(crane(), ub.EnergyMomentum(), t=(0, 0.1), dt=0.02)
     camera = ub.Camera(follow=run.scene.beams[1].end, width=4.0)
     path = tmp_path / "crane.png"
     ub.render(run, path, quantity=quantity, camera=camera, size=(320, 192))
@@ -368,7 +361,7 @@ def test_statics_of_small_loads_converge(force):
     beam = ub.Beam((0, 0, 0), (3, 0, 0), section, cells=4, up=(0, 1, 0))
     load = ub.PointLoad(beam.end, force=(0, force, force), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    tip = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False).displacement(beam.end)
+    tip = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0).displacement(beam.end)
     bending, shear = [section.EI, section.EI2], [section.GA, section.GA3]
     exact = 9.0 / np.array(bending) * (1 - 1 / (4 * 4**2)) + 3.0 / np.array(shear)
     assert np.abs(tip[-1, 1:3] / force / exact - 1).max() < 1e-5
@@ -381,12 +374,11 @@ WRONG = {
     "mixed points": (lambda: ub.Scene([BEAM, FLAT]), "two coordinates"),
     "mixed ends": (lambda: ub.Beam((0, 0), (1, 0, 0), BEAM.section), "must both have"),
     "up along the beam": (
-        lambda: ub.Beam((0, 0, 0), (0, 0, 2), BEAM.section), "up = (0.0, 0.0, 1.0) is along",
+        lambda: ub.Beam((0, 0, 0), (0, 0, 2), BEAM.section),
+        "up = (0.0, 0.0, 1.0) is along",
     ),
     "up in the plane": (lambda: ub.Beam((0, 0), (1, 0), BEAM.section, up=(0, 1)), "in space"),
-    "no torsion": (
-        lambda: ub.Scene([ub.Beam((0, 0, 0), (1, 0, 0), PLANAR)]), "no GA3, EI2, GJ",
-    ),
+    "no torsion": (lambda: ub.Scene([ub.Beam((0, 0, 0), (1, 0, 0), PLANAR)]), "no GA3, EI2, GJ"),
     "planar force": (
         lambda: ub.Scene([BEAM], loads=[ub.PointLoad(BEAM.end, force=(1, 0))]),
         "must have 3 components",
@@ -400,30 +392,28 @@ WRONG = {
         "must have 1 components",
     ),
     "follower at an arm": (
-        lambda: ub.Scene(
-            bodies=[BALL], loads=[ub.FollowerLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]
-        ), "not the centre of the body",
+        lambda: ub.Scene(bodies=[BALL], loads=[ub.FollowerLoad(BALL.at(1, 0, 0), force=(1, 0, 0))]),
+        "not the centre of the body",
     ),
     "moving mass": (
-        lambda: ub.Scene([BEAM], loads=[ub.MovingLoad(BEAM, abs, mass=1.0)]), "masses that move",
+        lambda: ub.Scene([BEAM], loads=[ub.MovingLoad(BEAM, abs, mass=1.0)]),
+        "masses that move",
     ),
     "revolute without axis": (
-        lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start), "give axis=(x, y, z)",
+        lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start),
+        "give axis=(x, y, z)",
     ),
     "axis of length zero": (
-        lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start, axis=(0, 0, 0)), "zero length",
+        lambda: ub.Revolute(ub.ground(0, 0, 0), BEAM.start, axis=(0, 0, 0)),
+        "zero length",
     ),
-    "no such body": (
-        lambda: ub.Body((0, 0, 0), mass=1.0, inertia=(1, 1, 3)), "no body has them",
-    ),
-    "scheme": (
-        lambda: ub.Simulation(ub.Scene([BEAM]), ub.Newmark()), "rotations in space need",
-    ),
+    "no such body": (lambda: ub.Body((0, 0, 0), mass=1.0, inertia=(1, 1, 3)), "no body has them"),
+    "scheme": (lambda: ub.Simulation(ub.Scene([BEAM]), ub.Newmark()), "rotations in space need"),
     "degree": (
         lambda: ub.Simulation(ub.Scene([BEAM]), ub.EnergyMomentum(), mesh=ub.Mesh(degree=2)),
         "degree 1",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -453,9 +443,7 @@ def pendulums():
 def test_joints_at_arms_are_exact_at_rest(dt):
     """Motions of 1e-12 of the arms have their own digits."""
     newton = ub.Newton(rtol=1e-13)
-    run = ub.simulate(
-        pendulums(), ub.EnergyMomentum(), t=(0, 20 * dt), dt=dt, newton=newton, progress=False
-    )
+    run = ub.simulate(pendulums(), ub.EnergyMomentum(), t=(0, 20 * dt), dt=dt, newton=newton)
     moved = np.abs(run.displacement(run.scene.bodies[1].at(0.3, 0, -0.4))[-1, :3])
     assert 0 < moved.max() < 9.81 * (20 * dt) ** 2
 
@@ -463,5 +451,5 @@ def test_joints_at_arms_are_exact_at_rest(dt):
 def test_a_failed_step_names_the_residual():
     scene = pendulums()
     with pytest.raises(ub.ConvergenceError, match=r"inertia .* N"):
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.5, progress=False,
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.5,
                     newton=ub.Newton(max_iterations=1))  # fmt: skip

@@ -37,7 +37,7 @@ def test_planar_modes_in_a_turned_plane(loads):
     for scene, count in ((frame, 4), (InSpace(frame, SKEW).scene, 12)):
         state = None
         if loads:
-            state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=EXACT, progress=False)
+            state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=EXACT)
         both.append(ub.modes(scene, count, at=state))
     plane, space = both
     found = space.omega[flat_modes(space)]
@@ -164,7 +164,7 @@ def test_frequencies_vanish_at_the_buckling_load():
     ).factors  # fmt: skip
     push = ub.PointLoad(beam.end, force=(-factor, 0, 0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=scene.supports, loads=[push])
-    run = ub.simulate(scene, ub.Static(), t=(0, 0.999), dt=0.333, newton=EXACT, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 0.999), dt=0.333, newton=EXACT)
     squares = [ub.modes(scene, 1, at=(run, n)).omega[0] ** 2 for n in range(4)]
     assert squares[3] < 2e-3 * squares[0]
     assert np.all(np.diff(squares) < 0)
@@ -226,10 +226,10 @@ def test_mechanisms_in_statics(case):
     parts, words = MECHANISMS[case]
     scene = ub.Scene([ARM], **parts)
     if not words:
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
         return
     with pytest.raises(ub.ModelError, match=re.escape(words)):
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, -0.7, 1.1), (2.0, 1.0, -0.4)])
@@ -245,7 +245,7 @@ def test_a_pendulum_hangs_in_statics(turn):
         ub.PointLoad(beam.end, force=tuple(0.1 * axes[1]), amplitude=lambda t: t),
     ]
     scene = ub.Scene([beam], joints=[joint], loads=loads)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=EXACT, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=EXACT)
     shape = run.shape(beam) @ axes.T
     weight = 9.81 * (shape[:-1] + shape[1:]) / 2  # of cells of 1 m and 1 kg
     assert abs(weight[:, 1].sum() + 0.1 * shape[-1, 2]) < 1e-9
@@ -371,7 +371,7 @@ def test_a_helix_of_ten_turns():
             beam.end, force=(0, 0, 50), moment=(0, 0, 200 * np.pi), amplitude=lambda t: t
         )
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, progress=False)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02)
         tips.append(run.position(beam.end)[-1])
     assert np.abs(extrapolated(tips) - [0.0048030, 0.000072, -0.076442]).max() < 5e-6
 
@@ -420,12 +420,9 @@ def by_differences(quantity, scheme, dt, **options):
     for name, value in AT.items():
         h = 2e-3 * value
         runs = [
-            ub.simulate(
-                bent_arm(**AT | {name: value + k * h}), scheme, t=(0, 1), dt=dt, progress=False,
-                **options,
-            )
+            ub.simulate(bent_arm(**AT | {name: value + k * h}), scheme, t=(0, 1), dt=dt, **options)
             for k in (-2, -1, 1, 2)
-        ]  # fmt: skip
+        ]
         far, near, near1, far1 = map(np.asarray, map(quantity, runs))
         found.append((8 * (near1 - near) - (far1 - far)) / (12 * h))
     return np.stack(found, axis=-1)

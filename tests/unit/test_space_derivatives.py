@@ -184,7 +184,7 @@ def test_a_parameter_of_a_prescribed_rotation_is_refused():
 
     options = {"t": (0, 1), "dt": 0.5}
     with pytest.raises(ub.ArgumentError, match="psi depends on a parameter"):
-        ub.differentiate(model, {"angle": 1.0}, ub.Static(), progress=False, **options)
+        ub.differentiate(model, {"angle": 1.0}, ub.Static(), **options)
     with pytest.raises(ub.ArgumentError, match="psi depends on a parameter"):
         ub.gradient(
             model, {"angle": 1.0}, ub.Static(), **options,
@@ -296,7 +296,7 @@ def steady(t):
 def linear_model(scene):
     """Return the linear model of the frame about a static state, and this state."""
     names, axes = (("u", "v", "w"), "xyz") if scene.in_space else (("u", "v"), "xy")
-    state = ub.simulate(scene, ub.Static(), t=(0, 2000), dt=200, newton=EXACT, progress=False)
+    state = ub.simulate(scene, ub.Static(), t=(0, 2000), dt=200, newton=EXACT)
     long, short = scene.beams
     places = long.at(0.4), scene.connectors[1].a, short.end
     kinds = "displacement", "velocity", "acceleration"
@@ -339,7 +339,6 @@ def test_a_linear_model_has_the_small_motions_of_a_run():
         scene = replace(state.scene, loads=[push, state.scene.loads[1]])
         run = ub.simulate(
             scene, ub.EnergyMomentum(), t=(2000, 2002), dt=dt, start=state, newton=EXACT,
-            progress=False,
         )  # fmt: skip
         moved = run.displacement(scene.beams[0].at(0.4))[[0, -1], :3]
         outputs, states = C[:3] @ exact[:n], model.state(run)

@@ -47,9 +47,7 @@ def cantilever(section, at, *, amplitude, hinges=None, size=1.0, damping=()):
     up = {} if at is in_plane else {"up": at(-3, 4)}
     beam = ub.Beam(at(1, 0), at(5, 3), section, cells=5, hinges=hinges or {}, **up)
     load = ub.PointLoad(beam.end, force=at(-3 * size, 4 * size), amplitude=amplitude)
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[*damping]
-    )  # fmt: skip
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[*damping])
 
 
 def in_both(scheme, laws, *, end=1.0, **more):
@@ -144,7 +142,7 @@ def test_creep_under_torsion_in_space():
     scene = ub.Scene(
         [beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[ub.KelvinVoigt(τ)]
     )  # fmt: skip
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, newton=EXACT)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, newton=EXACT)
     angle = run.displacement(beam.end)[:, 3:] @ axis
     exact = 4.0 * 3.0 / 400.0 * (1 - (1 + dt / τ) ** -np.arange(11.0))
     assert np.abs(angle - exact).max() < 1e-12
@@ -216,8 +214,7 @@ def flight(turn, **laws):
 
 def flown(turn, scheme=None, t=(0, 1.5), **more):
     return ub.simulate(
-        flight(turn, **SIX), scheme or ub.EnergyMomentum(), t=t, dt=0.02, newton=EXACT,
-        progress=False, **more,
+        flight(turn, **SIX), scheme or ub.EnergyMomentum(), t=t, dt=0.02, newton=EXACT, **more,
     )  # fmt: skip
 
 
@@ -253,10 +250,8 @@ def test_turned_scene_with_six_laws():
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], ids=str)
 def test_start_changes_no_bit(scheme):
     scene = cantilever(YIELDING, skew, amplitude=push)
-    whole, first = (
-        ub.simulate(scene, scheme, t=(0, t), dt=1 / 64, progress=False) for t in (1, 0.5)
-    )
-    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=1 / 64, start=first, progress=False)
+    whole, first = (ub.simulate(scene, scheme, t=(0, t), dt=1 / 64) for t in (1, 0.5))
+    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=1 / 64, start=first)
     for beam in scene.beams:
         assert (whole.displacement(beam.end)[-1] == second.displacement(beam.end)[-1]).all()
         for field in ("forces", "plastic"):
@@ -275,9 +270,7 @@ def test_restart_changes_no_bit(tmp_path, scene):
     made = two_hinges() if scene == "hinges" else flight(RANDOM, **SIX)
 
     def run(end, **more):
-        return ub.simulate(
-            made, ub.EnergyMomentum(), t=(0, end), dt=1 / 64, progress=False, **more
-        )  # fmt: skip
+        return ub.simulate(made, ub.EnergyMomentum(), t=(0, end), dt=1 / 64, **more)
 
     saved = ub.Checkpoint(tmp_path / "state", every=16)
     run(0.5, checkpoint=saved)
@@ -311,9 +304,7 @@ def two_hinges():
 
 @IN_LONG_CELLS
 def test_balance_of_hinges_about_several_axes():
-    run = ub.simulate(
-        two_hinges(), ub.EnergyMomentum(), t=(0, 2), dt=0.01, progress=False, newton=EXACT
-    )
+    run = ub.simulate(two_hinges(), ub.EnergyMomentum(), t=(0, 2), dt=0.01, newton=EXACT)
     largest = run.energy["loads"].max()
     assert np.abs(run.energy.imbalance).max() < 1e-12 * largest
     connectors = [*run.scene.connectors[:2], *run.scene.hinges]
@@ -348,10 +339,10 @@ def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
     )  # fmt: skip
     if kind == "in a cell":
         with pytest.warns(ub.ModelWarning, match="turned by 329 degrees.*times too stiff"):
-            run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+            run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
         jump = np.array([run.material(beam, n).jump[0] for n in range(len(run))])
     else:
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
         jump = run.connector(turns[0] if turns else run.scene.hinges[0]).motion
     moment = -run.connector(motor).force
     opened = slice(5, None)
@@ -385,7 +376,7 @@ def test_limit_moment_of_a_square_of_fibres(m, angle, axis):
     beam = ub.Beam((0, 0, 0), (1, 0, 0), square(m, angle, law), cells=1)
     motor = ub.Turn(ub.ground(1, 0, 0), beam.end, ub.PrescribedMotion(lambda t: t), axis=axis)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[motor])
-    run = ub.simulate(scene, ub.Static(), t=(0, 0.3), dt=0.01, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 0.3), dt=0.01)
     x = (np.arange(m) + 0.5) / m - 0.5
     across = np.abs(np.add.outer(x, x)) / np.sqrt(2) if angle else np.abs(np.add.outer(x, 0 * x))
     limit = fy * a**3 * across.sum() / m**2
@@ -414,11 +405,7 @@ def test_fibres_at_z_bend_about_axis_2_as_fibres_at_y_do_in_the_plane():
         beam = ub.Beam(at(0, 0), at(1.6, 1.2), section, cells=4, **up)
         load = ub.PointLoad(beam.end, force=at(-3e4, 4e4), amplitude=lambda t: np.sin(30 * t))
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        runs.append(
-            ub.simulate(
-                scene, ub.EnergyMomentum(), t=(0, 0.2), dt=2e-3, newton=EXACT, progress=False
-            )
-        )
+        runs.append(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=2e-3, newton=EXACT))
     plane, space = (run.displacement(run.scene.beams[0].end) for run in runs)
     moved = SKEW.inv().apply(space[:, :3])
     assert np.abs(moved[:, :2] - plane[:, :2]).max() < 1e-12 * 2
@@ -440,9 +427,7 @@ def test_fibres_of_large_limits_are_elastic():
         beam = ub.Beam((0, 0, 0), (2, 1, 0.5), section, cells=4)
         load = ub.PointLoad(beam.end, force=(2e5, -3e5, 4e5), moment=(5e5, 0, 0))
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        run = ub.simulate(
-            scene, ub.EnergyMomentum(), t=(0, 0.02), dt=1e-3, newton=EXACT, progress=False
-        )
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.02), dt=1e-3, newton=EXACT)
         tips.append(run.displacement(beam.end))
     assert np.abs(tips[0] - tips[1]).max() < 1e-12
 
@@ -482,10 +467,8 @@ def test_parts_that_yield_in_space_only():
 def test_start_from_a_state_in_between():
     """Elastic beams have no internal variables: the rotations of the nodes suffice."""
     scene = cantilever(ub.Section(**STIFF, **OTHER), skew, amplitude=push)
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, progress=False)
-    again = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0.04, 0.1), dt=0.02, start=(run, 2), progress=False
-    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02)
+    again = ub.simulate(scene, ub.EnergyMomentum(), t=(0.04, 0.1), dt=0.02, start=(run, 2))
     tips = [x.displacement(x.scene.beams[0].end)[-1] for x in (run, again)]
     assert np.abs(tips[0] - tips[1]).max() < 1e-10 * np.abs(tips[0]).max()
 
@@ -495,7 +478,7 @@ def test_solution_with_fibres_is_saved(tmp_path):
     beam = ub.Beam((0, 0, 0), (1, 0, 0), square(4, 0.0, ub.ElastoPlastic(fy)), cells=2)
     load = ub.PointLoad(beam.end, force=(0, 1e6, 2e6), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.01), dt=1e-3, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.01), dt=1e-3)
     run.save(tmp_path / "run.npz")
     loaded = ub.Solution.load(tmp_path / "run.npz")
     (own,) = loaded.scene.beams
@@ -520,10 +503,8 @@ def test_stiffness_across_an_embedded_hinge(degrees):
     motor = ub.Turn(ub.ground(1, 0, 0), beam.end, turn, axis=(0, 0, 1))
     along = np.array([np.cos(Θ / 2), np.sin(Θ / 2), 0.0])
     twist = ub.PointLoad(beam.end, moment=tuple(1e-2 * along), amplitude=lambda t: float(t > 1.001))
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], connectors=[motor], loads=[twist]
-    )  # fmt: skip
-    run = ub.simulate(scene, ub.Static(), t=(0, 1.02), dt=0.02, newton=EXACT, progress=False)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[motor], loads=[twist])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1.02), dt=0.02, newton=EXACT)
     before, after = (Rotation.from_rotvec(x[3:]) for x in run.displacement(beam.end)[-2:])
     small = (after * before.inv()).as_rotvec()
     stiffness = 1e-2 / (small @ along)

@@ -53,8 +53,7 @@ def propeller(psi=turns, arm=True):
 
 def test_a_root_turns_three_times_about_a_skew_axis():
     """The work is the energy, the moment changes the angular momentum, the axis stays."""
-    run = ub.simulate(propeller(), ub.EnergyMomentum(), t=(0, 4), dt=0.02, newton=EXACT,
-                      progress=False)  # fmt: skip
+    run = ub.simulate(propeller(), ub.EnergyMomentum(), t=(0, 4), dt=0.02, newton=EXACT)
     (root,), energy = run.scene.supports, run.energy
     assert np.abs(energy.supplied["supports"] - energy.total).max() < 1e-12 * energy.total.max()
     assert energy.total[-1] > 100.0
@@ -76,14 +75,7 @@ def test_a_driven_root_equals_a_joint_with_a_motor():
     joint = ub.Revolute(ground, beam.start, axis=tuple(AXIS))
     jointed = ub.Scene([beam], joints=[joint], connectors=[motor])
     one, other = (
-        ub.simulate(
-            x,
-            ub.EnergyMomentum(),
-            t=(0, 0.4),
-            dt=0.02,
-            newton=ub.Newton(rtol=1e-12),
-            progress=False,
-        )
+        ub.simulate(x, ub.EnergyMomentum(), t=(0, 0.4), dt=0.02, newton=ub.Newton(rtol=1e-12))
         for x in (driven, jointed)
     )
     ends = [run.displacement(run.scene.beams[0].end) for run in (one, other)]
@@ -100,7 +92,7 @@ def test_moments_of_a_hinge_in_statics(psi):
     pull = ub.PointLoad(beam.end, force=(1, -2, 3), amplitude=lambda t: 1 + t)
     spring = ub.Turn(ub.ground(0, 0, 0), beam.start, ub.Spring(100.0), axis=tuple(AXIS))
     whole = ub.Scene([beam], supports=[root], loads=[pull], connectors=[spring] * (psi is None))
-    run = ub.simulate(whole, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(whole, ub.Static(), t=(0, 1), dt=0.25)
     force = np.array([1.0, -2.0, 3.0]) * (1 + run.times[1:, None])
     reaction, tip = run.reaction(root)[1:], run.position(beam.end)[1:]
     moment = reaction[:, 3:].copy()
@@ -124,7 +116,7 @@ def test_a_point_slides_in_turned_axes():
     scene = ub.Scene(
         [beam], supports=rollers, connectors=[twist], loads=[ub.Gravity((0.0, -1.0, -9.81))]
     )
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=0.02, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=0.02)
     assert run.energy.worst < 1e-10
     for roller, line in zip(rollers, lines, strict=True):
         moved, force = run.displacement(roller.place)[:, :3], run.reaction(roller)[1:, :3]
@@ -149,7 +141,7 @@ def test_a_base_that_shakes_equals_an_acceleration_of_all_masses():
         loads=[ub.Gravity(tuple(-accelerations * (along - 2 * up)))],
     )  # fmt: skip
     runs = [
-        ub.simulate(x, ub.EnergyMomentum(), t=(0, 1), dt=0.05, newton=EXACT, progress=False)
+        ub.simulate(x, ub.EnergyMomentum(), t=(0, 1), dt=0.05, newton=EXACT)
         for x in (moving, still)
     ]
     one, other = (run.displacement(beam.end) for run in runs)
@@ -169,9 +161,7 @@ def test_start_and_checkpoint_of_a_hinge(psi, shared_path):
     pushed = ub.Scene([beam], supports=[root], loads=[push])
 
     def run(end, scene=pushed, begin=0.0, **more):  # times are binary numbers
-        return ub.simulate(
-            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 16, progress=False, **more
-        )
+        return ub.simulate(scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 16, **more)
 
     checkpoint = ub.Checkpoint(shared_path / "run.checkpoint", every=8)
     whole, first = run(4), run(2, checkpoint=checkpoint)
@@ -245,9 +235,9 @@ def test_work_of_a_moment_in_statics(kind):
     beam = ub.Beam((0, 0, 0), end, SECTION, cells=8, up=up)
     bend = kind(beam.end, moment=moment, amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[bend])
-    first = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    first = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     assert first.energy.worst < 1e-14
-    second = ub.simulate(scene, ub.Static(), t=(1, 2), dt=0.25, start=first, progress=False)
+    second = ub.simulate(scene, ub.Static(), t=(1, 2), dt=0.25, start=first)
     assert second.energy.worst < 1e-14
     angle = np.linalg.norm(first.displacement(beam.end)[-1, 3:])
     exact = 300.0 * np.hypot(3, 1) / STIFF["EI"]
@@ -263,7 +253,7 @@ def test_a_spinning_body_with_a_follower_force():
         bodies=[ball], loads=[ub.FollowerLoad(ball.middle, force=tuple(force))],
         initial=[ub.Velocity([ball], angular=tuple(spin), about=(1, 2, 3), linear=(0, 0, 0))],
     )  # fmt: skip
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=dt, newton=EXACT, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2), dt=dt, newton=EXACT)
     steps = 2 * np.arctan(np.linalg.norm(spin) * dt / 2) * (np.arange(40) + 0.5)
     directions = Rotation.from_rotvec(steps[:, None] * spin / np.linalg.norm(spin))
     momentum = np.cumsum(dt * directions.apply(force), axis=0)
@@ -283,12 +273,12 @@ def test_a_load_that_is_added_follows_the_rotation():
         ]
         scene = ub.Scene([beam], loads=loads, initial=[spin])
         return ub.simulate(
-            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, start=start, progress=False
+            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, start=start
         ).displacement(beam.end)[-1]
 
     whole = run(0, 2, lambda t: t > 1)
     scene = ub.Scene([beam], initial=[spin])
-    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / 32, progress=False)
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / 32)
     assert np.linalg.norm(first.displacement(beam.end)[-1, 3:]) > 1
     second = run(1, 2, lambda t: 1.0, first)
     assert np.abs(second - whole).max() < 1e-9
@@ -324,9 +314,7 @@ def test_a_machine_balances_and_restarts(shared_path):
     """The ledger closes; a restart from a checkpoint changes no bit, and start= only digits."""
 
     def run(end, begin=0.0, **more):
-        return ub.simulate(
-            scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, progress=False, **more
-        )
+        return ub.simulate(scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, **more)
 
     scene, checkpoint = machine(), ub.Checkpoint(shared_path / "run.checkpoint", every=8)
     wheel = scene.bodies[0].middle
@@ -358,9 +346,7 @@ def test_a_flight_seen_from_a_rotating_frame():
         return ub.Scene([beam], bodies=[wheel], joints=[joint], initial=[start], loads=frames)
 
     def states(turning, dt):
-        run = ub.simulate(
-            flight(turning), ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT, progress=False
-        )
+        run = ub.simulate(flight(turning), ub.EnergyMomentum(), t=(0, 1), dt=dt, newton=EXACT)
         assert run.energy.worst < 1e-12
         wheel = run.scene.bodies[0].middle
         return run.position(wheel)[-1], Rotation.from_rotvec(run.displacement(wheel)[-1, 3:])
@@ -395,7 +381,7 @@ def test_whirling_of_a_shaft():
                            profile=lambda s: np.sin(np.pi * s))  # fmt: skip
         frame = ub.RotatingFrame((Ω, 0, 0))
         scene = ub.Scene([shaft], supports=bearings, loads=[push, frame])
-        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 30), dt=dt, progress=False)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 30), dt=dt)
         y = run.displacement(shaft.at(0.5))[int(1 / dt) :, 1:3] @ [1.0, 1.0j]
         # The sum of two exponentials: y[n + 1] is a combination of y[n] and y[n - 1]
         (a, b), *_ = np.linalg.lstsq(np.column_stack([y[1:-1], y[:-2]]), y[2:], rcond=None)
@@ -417,9 +403,7 @@ WRONG = {
     "axis in the plane": (lambda: MOVED(PLANAR.end, axis=(0, 0, 1)), "axis is for scenes in space"),
     "third displacement in the plane": (lambda: MOVED(PLANAR.end, w=0), "w is for scenes in space"),
     "axis of length zero": (lambda: MOVED(BEAM.end, axis=(0, 0, 0)), "is no direction"),
-    "up along u": (
-        lambda: MOVED(BEAM.end, u=0, along=(0, 0, 2)), "up is along the direction of u",
-    ),
+    "up along u": (lambda: MOVED(BEAM.end, u=0, along=(0, 0, 2)), "up is along the direction of u"),
     "nothing": (lambda: MOVED(BEAM.end), "at least one of u, v, w, axis"),
     "two supports": (
         lambda: ub.Scene([BEAM], supports=[ub.Pinned(BEAM.end), MOVED(BEAM.end, w=0)]),
@@ -431,9 +415,10 @@ WRONG = {
     ),
     "one pressure": (lambda: ub.Scene([BEAM], loads=[ub.Pressure(BEAM, normal=1.0)]), "2 comp"),
     "two pressures": (
-        lambda: ub.Scene([PLANAR], loads=[ub.Pressure(PLANAR, normal=(1.0, 2.0))]), "1 comp",
+        lambda: ub.Scene([PLANAR], loads=[ub.Pressure(PLANAR, normal=(1.0, 2.0))]),
+        "1 comp",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -445,9 +430,7 @@ def test_errors_before_a_run(case):
 
 def test_a_turn_of_more_than_135_degrees_is_divided():
     """Also the sign of the rotation is kept, which a step of 270 degrees would not tell."""
-    run = ub.simulate(
-        propeller(lambda t: 6 * t, arm=False), ub.Static(), t=(0, 1), dt=1.0, progress=False
-    )
+    run = ub.simulate(propeller(lambda t: 6 * t, arm=False), ub.Static(), t=(0, 1), dt=1.0)
     turned = Rotation.from_rotvec(run.displacement(run.scene.supports[0].place)[-1, 3:])
     assert (turned * Rotation.from_rotvec(-6 * AXIS)).magnitude() < 1e-12
     assert np.abs(run.strains(run.scene.beams[0])).max() < 1e-12

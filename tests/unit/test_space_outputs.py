@@ -406,7 +406,7 @@ def fatigue():
     record = st.Fatigue(spot, st.SNCurve.eurocode(71e6))
     sway = ub.PointLoad(TOWER.end, force=(2e3, 1e3, 0), amplitude=lambda t: math.sin(t))
     scene = ub.Scene([TOWER], supports=[BASE], loads=[sway])
-    run = ub.simulate(scene, ub.Static(), t=(0, 20), dt=0.2, record=record, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 20), dt=0.2, record=record)
     forces = run.section_forces_at(TOWER.start)
     own = spot.stress(*forces.T)
     # Axis 2 is x, axis 3 is y: the foot has compression at x = 0.1 and tension at y = -0.05
@@ -424,7 +424,7 @@ def combinations():
     )}  # fmt: skip
     both = st.load_combinations(
         FREE, {name: [load] for name, load in push.items()},
-        {"A": {"x": 1.5}, "B": {"x": -1.0, "y": 1.0}}, progress=False,
+        {"A": {"x": 1.5}, "B": {"x": -1.0, "y": 1.0}},
     )  # fmt: skip
     found = both.section_forces(TOWER)
     M3, M2 = (found.high[0, 5], found.low[0, 5]), (found.high[0, 4], found.low[0, 4])
@@ -446,7 +446,7 @@ def drifts():
     assert found.drift[-1].sum() == pytest.approx(moved @ (0.6, 0.8), rel=1e-12)
     stays = [ub.Stretch(ub.ground(2, k, 0), TOWER.end, ub.Spring(1e5)) for k in (-1, 2)]
     stayed = ub.Scene([TOWER], supports=[BASE], loads=[WIND], connectors=stays)
-    run = ub.simulate(stayed, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(stayed, ub.Static(), t=(0, 1), dt=0.25)
     found = st.storeys(run, [TOWER.start, TOWER.at(0.5), TOWER.end], direction=(3, 4))
     assert np.abs(found.shear[-1] - [500.0 * 6, 500.0 * 3]).max() < 1e-5
     assert max(abs(run.connector(x).force[-1]) for x in stays) > 1e3
@@ -479,12 +479,9 @@ def capacities(pattern):
     """Capacity curves in the plane, and of the frame turned into the plane of y and z."""
     turned = InSpace(portal(), Rotation.from_matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])).scene
     return [
-        st.pushover(
-            scene, scene["left"].end, 0.2, pattern=pattern, component=component, steps=50,
-            progress=False,
-        )
+        st.pushover(scene, scene["left"].end, 0.2, pattern=pattern, component=component, steps=50)
         for scene, component in ((portal(), "u"), (turned, "v"))
-    ]  # fmt: skip
+    ]
 
 
 def pushes():
@@ -526,7 +523,7 @@ def leaning():
     column = ub.Scene([TOWER], supports=[BASE], loads=[push])
     buckles = ub.buckling(column, 1)
     crooked = st.imperfect(column, mode=buckles, amplitude=0.01)
-    run = ub.simulate(crooked, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    run = ub.simulate(crooked, ub.Static(), t=(0, 1), dt=0.5)
     moved = np.linalg.norm(run.displacement(crooked["tower"].end)[-1, :2])
     assert moved == pytest.approx(0.01 / (buckles.factors[0] - 1), rel=1e-3)
     for words, more in (
@@ -562,9 +559,8 @@ def incremental():
         return ub.Scene([TOWER], supports=[BASE], loads=[shaking])
 
     found = st.incremental_dynamic_analysis(
-        build, [pulse], [0.5, 1.0], limit=1.0, progress=False,
-        measure=lambda run: run.displacement(TOWER.end)[:, 0],
-    )  # fmt: skip
+        build, [pulse], [0.5, 1.0], limit=1.0, measure=lambda run: run.displacement(TOWER.end)[:, 0]
+    )
     assert found.demand[0, 1] == pytest.approx(2 * found.demand[0, 0], rel=1e-3)
 
 
@@ -588,7 +584,7 @@ def calibrated():
         dt=1.0,
         sigma=1e-9,
     )
-    fit = st.calibrate(model, {"E": 1.0}, [measured], progress=False)
+    fit = st.calibrate(model, {"E": 1.0}, [measured])
     assert fit.parameters["E"] == pytest.approx(0.7, rel=1e-5)
 
 
@@ -609,7 +605,7 @@ def spectral():
     for loaded in (False, True):
         found = []
         for scene, direction in (flat, (1, 0.3)), (copy.scene, copy.vector((1, 0.3))):  # all modes
-            state = {"at": ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)}
+            state = {"at": ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)}
             found.append(st.response_spectrum_analysis(
                 scene, ([1e-9, 9.0], [3.0, 3.0]), n=200, direction=direction,
                 **(state if loaded else {}),

@@ -278,7 +278,7 @@ def test_a_path_with_a_critical_point():
     )  # fmt: skip
     paths = [
         ub.follow(
-            scene, ub.ArcLength(0.2), until=lambda now: now.t > 6, steps=60, progress=False,
+            scene, ub.ArcLength(0.2), until=lambda now: now.t > 6, steps=60,
             newton=ub.Newton(rtol=1e-11), comm=comm,
         )
         for comm in (COMM, MPI.COMM_SELF)
@@ -338,7 +338,7 @@ def test_processes_agree_on_errors():
 
     def words(scene, error, comm=COMM, **more):
         with pytest.raises(error) as raised:
-            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), progress=False, comm=comm, **more)
+            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), comm=comm, **more)
         return str(raised.value)
 
     steps = ub.Adaptive(1e-3, first=0.1, shortest=0.01)

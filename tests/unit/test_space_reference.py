@@ -39,8 +39,7 @@ def test_equal_motion(case):
     make, scheme, t, dt = CASES[case]
     scene = make()
     ordinary, plain = (
-        ub.simulate(scene, scheme, t=(0, t), dt=dt, newton=newton, progress=False)
-        for newton in (EXACT, PLAIN)
+        ub.simulate(scene, scheme, t=(0, t), dt=dt, newton=newton) for newton in (EXACT, PLAIN)
     )
     for place in [beam.at(0.6) for beam in scene.beams] + [x.middle for x in scene.bodies]:
         one, other = (run.displacement(place) for run in (ordinary, plain))
@@ -51,4 +50,4 @@ def test_equal_motion(case):
 def test_scope():
     scheme = ub.EnergyMomentum(order=4)
     with pytest.raises(ub.ArgumentError, match="cannot be combined with EnergyMomentum"):
-        ub.simulate(bent(), scheme, t=(0, 1), dt=0.5, newton=PLAIN, progress=False)
+        ub.simulate(bent(), scheme, t=(0, 1), dt=0.5, newton=PLAIN)

@@ -10,11 +10,7 @@ from test_space import KINDS, LAWS, OTHER, STIFF, crane, flight, in_plane, in_sp
 
 import ufl_beam as ub
 
-SCHEMES = [
-    ub.EnergyMomentumDecaying(0.5),
-    ub.EnergyMomentum(beta=0.1),
-    ub.EnergyMomentum(order=4),
-]
+SCHEMES = [ub.EnergyMomentumDecaying(0.5), ub.EnergyMomentum(beta=0.1), ub.EnergyMomentum(order=4)]
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
@@ -49,7 +45,7 @@ def spinning(scheme, dt):
     body = ub.Body((0, 0, 0), mass=1.0, inertia=TENSOR)
     start = ub.Velocity([body], angular=SPIN, linear=(1, 0, 0), about=(0, 0, 0))
     scene = ub.Scene(bodies=[body], initial=[start])
-    return ub.simulate(scene, scheme, t=(0, 1), dt=dt, newton=EXACT, progress=False)
+    return ub.simulate(scene, scheme, t=(0, 1), dt=dt, newton=EXACT)
 
 
 def error(run, exact):
@@ -137,19 +133,19 @@ def test_start_with_another_scheme_keeps_the_rotations():
 )
 def test_schemes_that_add_angles_are_refused(scheme):
     with pytest.raises(ub.ModelError, match="a sum of angles about changing axes is no rotation"):
-        ub.simulate(crane(), scheme, t=(0, 1), dt=0.1, progress=False)
+        ub.simulate(crane(), scheme, t=(0, 1), dt=0.1)
 
 
 def test_order_4_is_refused_for_scenes_that_dissipate():
     scene = in_space(connectors=lambda *ends: [KINDS["Slide"](*ends, LAWS["damper"])])
     with pytest.raises(ub.ModelError, match="dissipates"):
-        ub.simulate(scene, ub.EnergyMomentum(order=4), t=(0, 1), dt=0.1, progress=False)
+        ub.simulate(scene, ub.EnergyMomentum(order=4), t=(0, 1), dt=0.1)
 
 
 @pytest.mark.parametrize("dt", [0.02, 0.1, 0.2])
 def test_drift_of_a_flight(dt):
     """Energy and momenta of a beam that tumbles in space for 1000 steps."""
-    first = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=dt, progress=False)
+    first = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=dt)
     arguments = {"t": (5, 5 + 1000 * dt), "dt": dt, "newton": EXACT, "progress": False}
     run = ub.simulate(first.scene, ub.EnergyMomentum(), start=first, **arguments)
     linear, angular = np.split(run.momentum(), 2, axis=1)
@@ -162,7 +158,7 @@ def test_drift_of_many_turns():
     scene = flight()
     away = ub.Velocity(scene.beams, linear=(-5, 0, 0), angular=(0, 0, 0))  # the load stops it
     scene = ub.Scene(scene.beams, loads=scene.loads, initial=[away])
-    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 5), dt=0.1, progress=False)
+    first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 5), dt=0.1)
     arguments = {"t": (5, 2005), "dt": 0.1, "newton": EXACT, "progress": False}
     run = ub.simulate(scene, ub.EnergyMomentum(), start=first, **arguments)
     for values in (run.energy.total, run.momentum()[:, 3:]):
@@ -175,13 +171,12 @@ def test_a_step_turns_a_node_by_two_radians():
         body = ub.Body((0, 0, 0), mass=1.0, inertia=(1, 2, 2.5), name="top")
         start = ub.Velocity([body], angular=(0, 0, spin), linear=(0, 0, 0), about=(0, 0, 0))
         scene = ub.Scene(bodies=[body], initial=[start])
-        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
         assert run.substeps == substeps
         assert run.energy.worst < 1e-10
     with pytest.raises(ub.ConvergenceError, match=r"top turns by 1\d\d° in the step"):
         ub.simulate(
             scene, ub.EnergyMomentum(), t=(0, 1), dt=ub.Adaptive(1.0, first=0.1, shortest=0.05),
-            progress=False,
         )  # fmt: skip
 
 
@@ -218,7 +213,7 @@ def test_small_loads_on_joints_at_rest(joint):
             [beam], bodies=[ball], joints=[JOINTS[joint](beam, ball)],
             supports=[ub.Clamped(beam.start)], loads=[load],
         )  # fmt: skip
-        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.04), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.04), dt=0.01)
         assert run.substeps == 4
         tips.append(run.displacement(ball.middle)[-1, :3] / size)
     # The motion under 1 N is 1e-5 m; what is nonlinear in it is that part of it.
@@ -249,7 +244,7 @@ def test_slender_rods(slenderness, scheme):
     force = (0, section.EI, section.EI)
     load = ub.PointLoad(beam.end, force=force, amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.1, progress=False)
+    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
     assert run.energy.worst < 1e-9
     if not scheme.dynamic:
         assert np.linalg.norm(run.displacement(beam.end)[-1, :3]) > 0.3
@@ -261,7 +256,7 @@ def test_fast_spins(spin):
     beam, _ = rod(20)
     start = ub.Velocity([beam], angular=spin, linear=(0, 0, 0), about=(0.5, 0, 0))
     scene = ub.Scene([beam], initial=[start])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, newton=EXACT, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, newton=EXACT)
     assert run.substeps > 10
     assert run.energy.worst < 1e-9
 
@@ -277,7 +272,7 @@ def test_ratios_of_stiffness_and_mass(name, factor):
     load = ub.PointLoad(beam.end, force=(0, 1e3, 1e3))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     try:
-        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01)
     except ub.ConvergenceError as error:
         run, words = error.solution, str(error)
     else:

@@ -13,7 +13,7 @@ SKEW = np.array([0.0, 0.6, 0.8])
 
 
 def statics(scene, dt=1.0, **more):
-    return ub.simulate(scene, ub.Static(), **({"t": (0, 1)} | more), dt=dt, progress=False)
+    return ub.simulate(scene, ub.Static(), **({"t": (0, 1)} | more), dt=dt)
 
 
 def rolled(turns, load=ub.PointLoad, cells=8, amplitude=lambda t: t):

@@ -152,9 +152,7 @@ FAMILIES = {
     "flying beam": (flying, ub.EnergyMomentum(), {"t": (0, 5), "dt": 0.05}),
     "flying beam, damped": (flying, ub.EnergyMomentum(0.01, 0.01), {"t": (0, 5), "dt": 0.05}),
     "flying beam, Newmark": (flying, ub.Newmark(), {"t": (0, 2), "dt": 0.02}),
-    "flying beam, generalized alpha": (
-        flying, ub.GeneralizedAlpha(0.8), {"t": (0, 2), "dt": 0.02}
-    ),
+    "flying beam, generalized alpha": (flying, ub.GeneralizedAlpha(0.8), {"t": (0, 2), "dt": 0.02}),
     "flying beam, order 4": (flying, ub.EnergyMomentum(order=4), {"t": (0, 2), "dt": 0.1}),
     "yielding": (yielding, DAMPED, STEPS),
     "Perzyna": (viscous, DAMPED, STEPS),
@@ -175,7 +173,7 @@ FAMILIES = {
     "damping ratio": (yielding, DAMPED, {"t": (0, 1.2), "dt": 0.004}, decay_ratio, 1e-5),
     # G_f changes the largest force little, just after the hinge opens
     "limit load": (pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, limit_load, 1e-5),
-}  # fmt: skip
+}
 """Models, schemes and steps, and quantities and tolerances other than the motion to AGREE."""
 
 

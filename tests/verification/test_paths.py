@@ -231,7 +231,7 @@ def test_a_brittle_hinge_softens_whatever_the_steps(ratio, arc, space):
     load = ub.PointLoad(beam.end, force=(0, limit / length, *z), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     path = ub.follow(
-        scene, ub.DissipationControl(energy / 20, ub.ArcLength(arc)), steps=100, progress=False,
+        scene, ub.DissipationControl(energy / 20, ub.ArcLength(arc)), steps=100,
         until=lambda now: now.ledger.lost["hinges"] > 0.9 * energy,
     )  # fmt: skip
     lost, factor = path.energy["hinges"], path.factor

@@ -21,7 +21,7 @@ LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
 
 def static(scene, dt=1.0, **more):
     """Static run from t = 0 to 1."""
-    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, **more)
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, **more)
 
 
 def moved(beam, **motion):
