@@ -19,7 +19,7 @@ import ufl_beam as ub
 
 pytestmark = [pytest.mark.serial, pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")]
 
-FEW = 4, 5, 6, 12, 18, 33, 47, 49, 52, 70, 72, 99
+FEW = 4, 5, 6, 12, 18, 47, 52, 70, 72, 99
 """Combinations with laws, hinges, connectors, joints, statics and dynamics, of a second each."""
 
 REASONS = (
@@ -150,7 +150,7 @@ def test_reasons_of_refusals(seed, reason):
     assert re.match(REASONS[reason], found.words, re.DOTALL), found
 
 
-@pytest.mark.parametrize("seed", [4, 5, 6, 12, 18, 47, 49, 52, 70, 72])
+@pytest.mark.parametrize("seed", FEW[:-1])
 def test_adjoint_is_the_direct_derivative(seed):
     """Of a random sum of motions at all times, which differences of `of` know to about 1e-9."""
     one, random = case(seed), np.random.default_rng(seed)
