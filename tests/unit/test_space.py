@@ -127,13 +127,6 @@ def test_flight_in_space():
     assert np.abs(moved - [13.25048125, 1.63440641, -2.07060071]).max() < 1e-7
 
 
-def test_restart_in_space_changes_no_bit():
-    whole, first = (ub.simulate(in_space(), ub.EnergyMomentum(), t=(0, t), dt=0.05) for t in (2, 1))
-    second = ub.simulate(first.scene, ub.EnergyMomentum(), t=(1, 2), dt=0.05, start=first)
-    for one, other in zip(whole.scene.beams, first.scene.beams, strict=True):
-        assert (whole.displacement(one.at(0.3))[-1] == second.displacement(other.at(0.3))[-1]).all()
-
-
 @dataclass(frozen=True)
 class Stiffening(ub.extend.ConnectorLaw):
     """A law of a user."""
