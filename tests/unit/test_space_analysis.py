@@ -362,20 +362,6 @@ def test_a_ring_turned_twice_by_180_degrees():
     assert abs(extrapolated(ends) / (2 * R / 3) - 1) < 10 * coarse**2
 
 
-def test_a_helix_of_ten_turns():
-    """Tip of Ibrahimbegović's beam (1997), by shooting: differential equation to 6 digits."""
-    coil, tips = ub.Section(EA=1e4, GA=1e4, GA3=1e4, EI=1e2, EI2=1e2, GJ=1e2), []
-    for cells in (200, 400):
-        beam = ub.Beam((0, 0, 0), (10, 0, 0), coil, cells=cells)
-        load = ub.PointLoad(
-            beam.end, force=(0, 0, 50), moment=(0, 0, 200 * np.pi), amplitude=lambda t: t
-        )
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02)
-        tips.append(run.position(beam.end)[-1])
-    assert np.abs(extrapolated(tips) - [0.0048030, 0.000072, -0.076442]).max() < 5e-6
-
-
 # -- derivatives of runs ---------------------------------------------------------------------------
 
 

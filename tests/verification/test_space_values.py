@@ -187,5 +187,7 @@ def test_top_of_simo_and_wong():
         moving = run.energy["kinetic"][0] + 20.0 * centre[2]
         assert moving == pytest.approx(1269.975, abs=5e-4)
         assert run.energy.worst < 1e-10 * moving
-        errors.append(np.linalg.norm(run.position(top.middle)[-1] - axis))
+        path = run.position(top.middle)
+        assert np.abs(np.linalg.norm(path, axis=1) - 1).max() < 1e-9  # rtol
+        errors.append(np.linalg.norm(path[-1] - axis))
     assert 1.9 < np.log2(errors[0] / errors[1]) < 2.1
