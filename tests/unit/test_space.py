@@ -2,12 +2,13 @@
 """Scenes in space: equality with the plane, balances, restart, and errors before a run."""
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from into_space import EXACT, SKEW, InSpace, same_in_space
 from scipy.spatial.transform import Rotation
+from user_classes import Stiffening
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -127,20 +128,12 @@ def test_flight_in_space():
     assert np.abs(moved - [13.25048125, 1.63440641, -2.07060071]).max() < 1e-7
 
 
-@dataclass(frozen=True)
-class Stiffening(ub.extend.ConnectorLaw):
-    """A law of a user."""
-
-    def energy(self, motion, *_):
-        return 30 * motion**2 + 100 * motion**4
-
-
 @pytest.mark.parametrize("law", [*LAWS, "own law"])
 def test_start_with_a_connector_at_an_arm(law):
     """The motion at the beginning depends on the rotation of the body in the earlier run."""
     beam = ub.Beam((0, 0, 0), (2, 1, 0), ub.Section(**STIFF, **OTHER), cells=3)
     wheel = ub.Body((2.5, 1, 0.3), mass=2.0, inertia=(1, 1, 1.5))
-    one = LAWS.get(law, Stiffening())
+    one = LAWS.get(law, Stiffening(60.0, 400.0))
     pull = ub.Stretch(wheel.at(2.6, 1, 0.4), ub.ground(3, 0, 2), one)
     scene = ub.Scene(
         [beam], bodies=[wheel], supports=[ub.Clamped(beam.start)], connectors=[pull],

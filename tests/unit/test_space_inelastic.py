@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Inelastic beams in space: equality with the plane, fibres, hinges, balances, restart."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 import pytest
 from into_space import EXACT, SKEW, same_in_space
 from scipy.spatial.transform import Rotation
+from user_laws import SameHardening
 
 import ufl_beam as ub
 import ufl_beam.structures as st
@@ -15,23 +13,6 @@ from ufl_beam.model.constraint_checks import parts_that_switch
 
 STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
 OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
-
-
-@dataclass(frozen=True)
-class Maxwell(ub.extend.MaterialLaw):
-    """A spring and a damper in series, of a user."""
-
-    tau: float
-    variables: ClassVar = {"flow": 0.0}
-
-    def residuals(self, strain, old, new, dt):
-        return {"flow": new.flow - old.flow - dt / self.tau * (strain - new.flow)}
-
-    def stress(self, strain, state):
-        return self.C * (strain - state.flow)
-
-    def elastic_energy(self, strain, state):
-        return self.C / 2 * (strain - state.flow) ** 2
 
 
 def in_plane(x, y):
@@ -82,7 +63,7 @@ RESULTANTS = {
     "Duvaut-Lions": {"bending": ub.ElastoPlastic(8.0, viscosity=ub.DuvautLions(tau=0.1))},
     "Ramberg-Osgood": {"bending": st.RambergOsgood(8.0, offset=0.002, exponent=5.0)},
     "Armstrong-Frederick": {"bending": st.ArmstrongFrederick(8.0, 100.0, 10.0)},
-    "Maxwell": {"bending": Maxwell(tau=0.1)},
+    "by residuals": {"bending": SameHardening(8.0, 20.0, 30.0, 1.0)},
     "hinge of the section": {"hinge": ub.LinearSoftening(8.0, fracture_energy=10.0)},
 }  # fmt: skip
 
