@@ -7,12 +7,9 @@ import numpy as np
 import pytest
 from into_space import EXACT, SKEW, InSpace
 from scipy.spatial.transform import Rotation
+from test_space import OTHER, PLANAR, STIFF
 
 import ufl_beam as ub
-
-STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
-OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
-FLAT = ub.Section(**STIFF)
 
 
 def flat_modes(shapes):
@@ -25,8 +22,8 @@ def flat_modes(shapes):
 @pytest.mark.parametrize("loads", [(), ((3.0, -8.0),)])
 def test_planar_modes_in_a_turned_plane(loads):
     """Modes of a planar frame are among those in space, undeformed and about a static state."""
-    long = ub.Beam((6, 0), (0, 8), FLAT, cells=6)
-    short = ub.Beam((0, 8), (3, 9), FLAT, cells=3)
+    long = ub.Beam((6, 0), (0, 8), PLANAR, cells=6)
+    short = ub.Beam((0, 8), (3, 9), PLANAR, cells=3)
     ball = ub.Body((3.5, 9), mass=30.0, inertia=5.0)
     frame = ub.Scene(
         [long, short], bodies=[ball], supports=[ub.Clamped(long.start)],
@@ -46,7 +43,7 @@ def test_planar_modes_in_a_turned_plane(loads):
 
 
 def test_planar_buckling_in_a_turned_plane():
-    beam = ub.Beam((0, 0), (0, 5), FLAT, cells=6)
+    beam = ub.Beam((0, 0), (0, 5), PLANAR, cells=6)
     load = ub.PointLoad(beam.end, force=(0, -1.0))
     plane = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     one, other = (ub.buckling(x, 1).factors[0] for x in (plane, InSpace(plane, SKEW).scene))

@@ -7,16 +7,13 @@ import numpy as np
 import pytest
 from into_space import EXACT, SKEW, InSpace, same_in_space
 from scipy.linalg import expm
+from test_space import OTHER, PLANAR, STIFF
 
 import ufl_beam as ub
 from ufl_beam.blocks.beams import alike
 from ufl_beam.blocks.block import called
 from ufl_beam.blocks.spatial_beams import ElasticCellInSpace
 from ufl_beam.blocks.statement import kernels
-
-STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
-OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
-FLAT = ub.Section(**STIFF)
 
 
 def growing(t):
@@ -274,8 +271,8 @@ def test_derivatives_of_a_yielding_planar_beam_in_a_turned_plane(scheme):
 
 def frame():
     """A frame with a body on a spring, dampers and loads, on a support in turned axes."""
-    long = ub.Beam((6, 0), (0, 8), FLAT, cells=4)
-    short = ub.Beam((0, 8), (3, 9), FLAT, cells=2)
+    long = ub.Beam((6, 0), (0, 8), PLANAR, cells=4)
+    short = ub.Beam((0, 8), (3, 9), PLANAR, cells=2)
     ball = ub.Body((3.5, 9), mass=30.0, inertia=5.0)
     corner, ground = ball.at(3, 9), ub.ground(8, 12)
     return ub.Scene(

@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 from into_space import EXACT, SKEW, same_in_space
 from scipy.spatial.transform import Rotation
+from test_space import OTHER, STIFF
 from user_laws import SameHardening
 
 import ufl_beam as ub
 import ufl_beam.structures as st
 from ufl_beam.model.constraint_checks import parts_that_switch
-
-STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
-OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
 
 
 def in_plane(x, y):

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from into_space import EXACT, SKEW, same_in_space
 from scipy.spatial.transform import Rotation
+from test_space import OTHER, PLANAR, STIFF
 
 import ufl_beam as ub
 
-STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
-OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
-SECTION, FLAT = ub.Section(**STIFF, **OTHER), ub.Section(**STIFF)
+SECTION = ub.Section(**STIFF, **OTHER)
 SCHEMES = [
     ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.Static(),
     ub.EnergyMomentumStatic(),
@@ -21,8 +20,8 @@ SCHEMES = [
 
 def driven(loads=lambda post, girder: []):
     """A frame whose foot moves and turns as functions of time, on a roller at an angle."""
-    post = ub.Beam((0, 0), (4, 3), FLAT, cells=4)
-    girder = ub.Beam((4, 3), (7, 3), FLAT, cells=3)
+    post = ub.Beam((0, 0), (4, 3), PLANAR, cells=4)
+    girder = ub.Beam((4, 3), (7, 3), PLANAR, cells=3)
     foot = ub.PrescribedDisplacement(
         post.start, u=lambda t: 0.3 * np.sin(2 * t), v=lambda t: 0.1 * t, psi=lambda t: 1.5 * t * t,
         along=(3, 4),
@@ -201,7 +200,7 @@ def test_a_driven_frame_with_loads_equals_the_plane(loads, scheme):
 
 def with_ball(loads):
     """A beam with a ball."""
-    beam = ub.Beam((0, 0), (2, 0), FLAT, cells=4)
+    beam = ub.Beam((0, 0), (2, 0), PLANAR, cells=4)
     ball = ub.Body((2.5, 0.3), mass=3.0, inertia=0.7)
     return ub.Scene(
         [beam], bodies=[ball], joints=[ub.Rigid(beam.end, ball.at(2, 0))],
@@ -394,14 +393,14 @@ def test_whirling_of_a_shaft():
 
 
 BEAM = ub.Beam((0, 0, 0), (1, 0, 0), SECTION, name="arm")
-PLANAR = ub.Beam((0, 0), (1, 0), FLAT)
+FLAT = ub.Beam((0, 0), (1, 0), PLANAR)
 MOVED = ub.PrescribedDisplacement
 WRONG = {
     "roller of the plane": (lambda: ub.Roller(BEAM.end, along=(1, 1)), "must have 3 components"),
-    "roller of space": (lambda: ub.Roller(PLANAR.end, along=(1, 1, 0)), "must have 2 components"),
+    "roller of space": (lambda: ub.Roller(FLAT.end, along=(1, 1, 0)), "must have 2 components"),
     "rotation without axis": (lambda: MOVED(BEAM.end, psi=0.1), "give the axis=(x, y, z)"),
-    "axis in the plane": (lambda: MOVED(PLANAR.end, axis=(0, 0, 1)), "axis is for scenes in space"),
-    "third displacement in the plane": (lambda: MOVED(PLANAR.end, w=0), "w is for scenes in space"),
+    "axis in the plane": (lambda: MOVED(FLAT.end, axis=(0, 0, 1)), "axis is for scenes in space"),
+    "third displacement in the plane": (lambda: MOVED(FLAT.end, w=0), "w is for scenes in space"),
     "axis of length zero": (lambda: MOVED(BEAM.end, axis=(0, 0, 0)), "is no direction"),
     "up along u": (lambda: MOVED(BEAM.end, u=0, along=(0, 0, 2)), "up is along the direction of u"),
     "nothing": (lambda: MOVED(BEAM.end), "at least one of u, v, w, axis"),
@@ -415,7 +414,7 @@ WRONG = {
     ),
     "one pressure": (lambda: ub.Scene([BEAM], loads=[ub.Pressure(BEAM, normal=1.0)]), "2 comp"),
     "two pressures": (
-        lambda: ub.Scene([PLANAR], loads=[ub.Pressure(PLANAR, normal=(1.0, 2.0))]),
+        lambda: ub.Scene([FLAT], loads=[ub.Pressure(FLAT, normal=(1.0, 2.0))]),
         "1 comp",
     ),
 }
