@@ -232,7 +232,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     law(smooth)
     found = ask(tolerance=1e-4)
     assert set(found.recommended) == {"scheme", "t", "dt", "mesh", "newton"}
-    again = tradeoff.simulate(SCENE, **found.recommended)
+    again = tradeoff.simulate(SCENE, progress=False, **found.recommended)
     assert again.value == found.best.values["value"]
     said = str(found)
     assert "errors of 0.0001 of each quantity" in said
