@@ -193,7 +193,7 @@ def same_in_space(
 ):
     """Require that a planar scene and its copy in space have equal runs; return both."""
     copy = InSpace(plane, turn)
-    options = {"t": t, "dt": dt, "newton": EXACT, "progress": False} | more
+    options = {"t": t, "dt": dt, "newton": EXACT} | more
     runs = [ub.simulate(x, scheme, **options) for x in (plane, copy.scene)]
     for name, difference, size in differences(copy, *runs, forces=forces):
         assert difference <= tolerance * size, name

@@ -95,7 +95,7 @@ def outcome(one):
 
 def compare(one, newton):
     """The same with given tolerances."""
-    options = {"newton": newton, "progress": False, **one.run}
+    options = {"newton": newton, **one.run}
     try:
         found = ub.differentiate(one.model, {"x": 1.0}, **options)
     except ub.ConvergenceError as error:

@@ -24,10 +24,10 @@ EXACT = 1e-9
 AGREE = 1e-7
 """Differences of runs have 8 to 10 digits at the best change of the parameter."""
 
-TO_THE_DIGITS = {"newton": TIGHT, "progress": False}
+TO_THE_DIGITS = {"newton": TIGHT}
 RUN = {"t": (0, 1), "dt": 0.25, **TO_THE_DIGITS}
 DYNAMIC = {"t": (0, 0.6), "dt": 0.01, **TO_THE_DIGITS}
-SHORT = {"t": (0, 0.02), "dt": 0.01, "progress": False}
+SHORT = {"t": (0, 0.02), "dt": 0.01}
 DAMPED = ub.EnergyMomentum(0.05)
 
 

@@ -19,7 +19,7 @@ pytestmark = [
 ]
 DYNAMIC = ub.EnergyMomentum(0.02, 0.01), ub.GeneralizedAlpha(0.8)
 STATIC = ub.Static(), ub.EnergyMomentumStatic(0.7)
-TWO_STEPS = {"t": (0, 0.1), "dt": 0.05, "progress": False}
+TWO_STEPS = {"t": (0, 0.1), "dt": 0.05}
 
 
 def scene_of(EI, *loads, law=None, supports=(), **parts):
@@ -228,7 +228,7 @@ def test_derivatives_are_those_of_runs_whose_steps_are_divided(scheme):
     ],
 )
 def test_a_run_in_two_parts_has_the_derivatives_of_one(model, scheme):
-    at, options = defaults(model), {"dt": 0.05, "newton": TIGHT, "progress": False}
+    at, options = defaults(model), {"dt": 0.05, "newton": TIGHT}
     first = ub.differentiate(model, at, scheme, t=(0, 0.3), **options)
     second = ub.differentiate(model, at, scheme, t=(0.3, 0.6), start=first, **options)
     whole = ub.differentiate(model, at, scheme, t=(0, 0.6), **options)

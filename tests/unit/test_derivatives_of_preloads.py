@@ -110,7 +110,7 @@ def forces(s):
     return np.array([[x.N, x.V, x.M] for x in diagrams])
 
 
-TO_THE_DIGITS = {"newton": TIGHT, "progress": False}
+TO_THE_DIGITS = {"newton": TIGHT}
 
 
 @cache

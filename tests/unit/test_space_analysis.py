@@ -171,7 +171,7 @@ def test_runs_start_from_stored_states():
     """In dynamics and statics, with a dead moment and a spring at an arm of a body."""
     for scheme in (ub.EnergyMomentum(), ub.Static()):
         scene = bent_arm()
-        options = {"dt": 0.1, "newton": EXACT, "progress": False}
+        options = {"dt": 0.1, "newton": EXACT}
         whole = ub.simulate(scene, scheme, t=(0, 1), **options)
         second = ub.simulate(scene, scheme, t=(0.5, 1), start=(whole, 5), **options)
         for part in (*scene.beams, *scene.bodies):

@@ -21,7 +21,7 @@ from test_space_inelastic import (
 
 import ufl_beam as ub
 
-RUN = {"newton": EXACT, "progress": False}
+RUN = {"newton": EXACT}
 YIELDING = RESULTANTS["bending"]
 SECTION = ub.Section(**STIFF, **OTHER)
 

@@ -215,7 +215,7 @@ def test_derivatives_of_a_beam_that_turns_far():
     derivative of the energy, 9.4 J, differs by -5.1e-9 to 2.1e-9 J, and differences of runs by
     5e-11 J.  So a derivative is known to 3e-8 of the quantity over the parameter.
     """
-    options = {"t": (0, 3), "dt": 0.05, "newton": EXACT, "progress": False}
+    options = {"t": (0, 3), "dt": 0.05, "newton": EXACT}
     scheme, at = ub.EnergyMomentum(), {"EI": 20.0}
     run = ub.differentiate(spinning, at, scheme, **options)
     quantities = (
@@ -235,7 +235,6 @@ def test_derivatives_of_a_beam_that_turns_far():
     def height(s):
         return s.displacement(s.scene.beams[0].end)[:, 2]
 
-    del options["progress"]
     _, slopes = ub.gradient(spinning, at, scheme, of=height, **options)
     direct = run.of(lambda s: height(s)[-1])
     assert np.abs(slopes - direct).max() < 1e-8 * np.abs(height(run.solution)).max() / 20.0
@@ -255,7 +254,7 @@ def test_derivatives_of_a_yielding_planar_beam_in_a_turned_plane(scheme):
         return InSpace(plane(**values), SKEW).scene
 
     values = {"limit": 6.0, "load": 9.0}
-    options = {"dt": 0.05, "newton": EXACT, "progress": False}
+    options = {"dt": 0.05, "newton": EXACT}
     slopes, forces = [], []
     for made, across in ((plane, (0, 1)), (space, SKEW.apply([0, 1, 0]))):
 

@@ -22,7 +22,7 @@ import ufl_beam as ub
 import ufl_beam.structures as st
 
 SECTION = ub.Section(**STIFF, **OTHER)
-RUN = {"newton": EXACT, "progress": False}
+RUN = {"newton": EXACT}
 
 
 def skew(*vector):
@@ -392,7 +392,7 @@ TOWER = ub.Beam((0, 0, 0), (0, 0, 6), TUBE, up=(1, 0, 0), name="tower")
 BASE = ub.Clamped(TOWER.start)
 FREE = ub.Scene([TOWER], supports=[BASE])
 WIND = ub.LineLoad(TOWER, force=(300.0, 400.0, 0.0))
-STATIC = {"t": (0, 1), "dt": 1.0, "progress": False}
+STATIC = {"t": (0, 1), "dt": 1.0}
 
 
 def blown():
@@ -539,7 +539,7 @@ def leaning():
 def test_start_with_a_hinge_at_a_joint():
     """Rotations of vertices that are in no cell, before hinges, begin with those of the run."""
     first = InSpace(portal(), SKEW).scene
-    arguments = {"scheme": ub.Static(), "dt": 1.0, "progress": False}
+    arguments = {"scheme": ub.Static(), "dt": 1.0}
     before = ub.simulate(first, t=(0, 1), **arguments)
     # Another scene of the same beams, so that loads and supports are set anew
     second = ub.Scene(

@@ -80,7 +80,7 @@ def compare(run, alone, same=SAME):
 
 def check(scene, scheme=None, *, t=(0, 0.4), dt=0.02, same=SAME, **more):
     """Compare a run on all processes with one of this process alone; return both."""
-    arguments = {"t": t, "dt": dt, "newton": EXACT, "progress": False, **more}
+    arguments = {"t": t, "dt": dt, "newton": EXACT, **more}
     scheme = scheme or ub.EnergyMomentum()
     run = ub.simulate(scene, scheme, **arguments)
     alone = ub.simulate(scene, scheme, **arguments, comm=MPI.COMM_SELF)
@@ -300,7 +300,7 @@ def test_recorders(shared_path, on_first_rank):
             ub.VTKHDF(shared_path / f"{name}.vtkhdf"),
         ]  # fmt: skip
 
-    arguments = {"t": (0, 0.4), "dt": 0.02, "newton": EXACT, "progress": False}
+    arguments = {"t": (0, 0.4), "dt": 0.02, "newton": EXACT}
     run = ub.simulate(scene, ub.EnergyMomentum(), record=(shared := recorded("all")), **arguments)
     by_one = recorded("one")
     on_first_rank(lambda: ub.simulate(

@@ -92,7 +92,7 @@ CONTROLS = {
 @pytest.mark.parametrize("case", CONTROLS)
 def test_a_checkpoint_changes_no_bit(case, shared_path):
     scheme, dt = CONTROLS[case]
-    arguments = {"t": (0, 0.2), "dt": dt, "progress": False}
+    arguments = {"t": (0, 0.2), "dt": dt}
     scene = crane()
     whole = ub.simulate(scene, scheme, **arguments)
     backup = ub.Checkpoint(shared_path / "run.h5", every=1)
@@ -106,7 +106,7 @@ def test_a_checkpoint_changes_no_bit(case, shared_path):
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), SCHEMES[0], SCHEMES[2]], ids=str)
 def test_start_changes_no_bit(scheme):
-    scene, more = in_space(), {"dt": 1 / 32, "progress": False}
+    scene, more = in_space(), {"dt": 1 / 32}
     whole, first = (ub.simulate(scene, scheme, t=(0, t), **more) for t in (2, 1))
     second = ub.simulate(scene, scheme, t=(1, 2), start=first, **more)
     for place in (scene.beams[0].at(0.3), scene.beams[1].start):
@@ -115,7 +115,7 @@ def test_start_changes_no_bit(scheme):
 
 def test_start_with_another_scheme_keeps_the_rotations():
     """Only the decaying scheme has changes of strains among the states of its cells."""
-    scene, more = in_space(), {"dt": 0.05, "progress": False}
+    scene, more = in_space(), {"dt": 0.05}
     first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), **more)
     second = ub.simulate(scene, SCHEMES[0], t=(1, 2), start=first, **more)
     third = ub.simulate(scene, ub.EnergyMomentum(), t=(2, 3), start=second, **more)
@@ -145,7 +145,7 @@ def test_order_4_is_refused_for_scenes_that_dissipate():
 def test_drift_of_a_flight(dt):
     """Energy and momenta of a beam that tumbles in space for 1000 steps."""
     first = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=dt)
-    arguments = {"t": (5, 5 + 1000 * dt), "dt": dt, "newton": EXACT, "progress": False}
+    arguments = {"t": (5, 5 + 1000 * dt), "dt": dt, "newton": EXACT}
     run = ub.simulate(first.scene, ub.EnergyMomentum(), start=first, **arguments)
     linear, angular = np.split(run.momentum(), 2, axis=1)
     for values, drift in ((run.energy.total, 1e-12), (linear, 1e-11), (angular, 1e-12)):
@@ -158,7 +158,7 @@ def test_drift_of_many_turns():
     away = ub.Velocity(scene.beams, linear=(-5, 0, 0), angular=(0, 0, 0))  # the load stops it
     scene = ub.Scene(scene.beams, loads=scene.loads, initial=[away])
     first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 5), dt=0.1)
-    arguments = {"t": (5, 2005), "dt": 0.1, "newton": EXACT, "progress": False}
+    arguments = {"t": (5, 2005), "dt": 0.1, "newton": EXACT}
     run = ub.simulate(scene, ub.EnergyMomentum(), start=first, **arguments)
     for values in (run.energy.total, run.momentum()[:, 3:]):
         assert np.abs(values - values[0]).max() < 1e-12 * np.linalg.norm(values[0])
@@ -185,7 +185,7 @@ def test_start_in_statics_changes_no_bit(scheme):
     beam = ub.Beam((0, 0, 0), (0, 1, 2), ub.Section(**STIFF, **OTHER), cells=4)
     load = ub.PointLoad(beam.end, force=(30, 5, 0), moment=(3, 0, 9), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    more = {"dt": 1 / 8, "progress": False}
+    more = {"dt": 1 / 8}
     whole, first = (ub.simulate(scene, scheme, t=(0, t), **more) for t in (1, 0.5))
     second = ub.simulate(scene, scheme, t=(0.5, 1), start=first, **more)
     assert whole.substeps == first.substeps + second.substeps == 8

@@ -239,7 +239,7 @@ def powers(k=3.0, power=1.5, kind=Power):
 @pytest.mark.serial
 def test_derivatives_by_numbers_in_a_statement():
     """Central differences: an error of 1e-8 by a relative step of 1e-4, and of Newton's method."""
-    options = {"t": (0, 0.5), "dt": 0.05, "newton": ub.Newton(rtol=1e-12), "progress": False}
+    options = {"t": (0, 0.5), "dt": 0.05, "newton": ub.Newton(rtol=1e-12)}
     at, scheme, step = {"k": 3.0, "power": 1.5}, ub.EnergyMomentum(), 1e-4
     found = ub.differentiate(powers, at, scheme, **options).of(lambda run: run.q[-1])
     for p, (name, value) in enumerate(at.items()):
@@ -252,7 +252,7 @@ def test_derivatives_by_numbers_in_a_statement():
         np.testing.assert_allclose(found[:, p], difference, rtol=0, atol=1e-6 * largest)
 
 
-SHORT = {"t": (0, 0.1), "dt": 0.05, "progress": False}
+SHORT = {"t": (0, 0.1), "dt": 0.05}
 
 
 @pytest.mark.serial

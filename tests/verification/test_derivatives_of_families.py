@@ -199,7 +199,7 @@ def test_derivatives_by_all_parameters(name):
 def test_derivatives_far_from_the_origin():
     """They do not depend on the place of a scene; coordinates of 300 m have two digits less."""
     at, near, far = {"length": 2.1, "height": 0.2}, swinging, partial(swinging, x=300.1, y=-200.1)
-    options = {"newton": TIGHT, "progress": False, "t": (0, 1), "dt": 0.01}
+    options = {"newton": TIGHT, "t": (0, 1), "dt": 0.01}
     runs = (ub.differentiate(model, at, ub.EnergyMomentum(), **options) for model in (near, far))
     expected, found = (run.of(history) for run in runs)
     for p in range(2):
@@ -211,7 +211,7 @@ def test_tolerances_of_steps():
     at = {"limit": 60e3, "EI": 9e6}
 
     def derivatives(rtol):
-        options = {"newton": ub.Newton(rtol=rtol), "progress": False, **STEPS}
+        options = {"newton": ub.Newton(rtol=rtol), **STEPS}
         return ub.differentiate(yielding, at, DAMPED, **options).of(history)
 
     exact = derivatives(TIGHT.rtol)

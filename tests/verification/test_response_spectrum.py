@@ -160,7 +160,7 @@ def test_section_forces_of_a_mode_are_those_of_a_static_run(degree):
                 return float(response.modes.shape(0, beam.at(s))[axis].real)
 
             loads.append(ub.LineLoad(beam, **density, profile=along))
-    steps = {"t": (0, 1), "dt": 1.0, "mesh": mesh, "progress": False}
+    steps = {"t": (0, 1), "dt": 1.0, "mesh": mesh}
     run, foot = ub.simulate(replace(scene, loads=loads), ub.Static(), **steps), scene.supports[0]
     moved = np.abs(run.displacement(arm.end)[-1])
     np.testing.assert_allclose(response.displacement(arm.end), moved, rtol=1e-5)
