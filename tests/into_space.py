@@ -4,6 +4,7 @@
 from dataclasses import fields, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import ufl_beam as ub
 from ufl_beam.model.bodies import GROUND, BodyPoint, Place
@@ -12,6 +13,9 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import LOADS
 from ufl_beam.model.supports import Support
 from ufl_beam.model.works import Work
+
+SKEW = Rotation.from_rotvec([0.3, -0.7, 1.1])
+EXACT = ub.Newton(rtol=1e-13)
 
 AXES = {"force", "acceleration", "linear", "about", "along"}
 """Fields with a vector of the plane."""
@@ -182,6 +186,18 @@ class InSpace:
 
     def Pressure(self, load):
         return self.same(load, normal=(load.normal, 0.0))
+
+
+def same_in_space(
+    plane, scheme, *, turn=SKEW, t=(0, 1), dt=0.1, forces=False, tolerance=1e-11, **more
+):
+    """Require that a planar scene and its copy in space have equal runs; return both."""
+    copy = InSpace(plane, turn)
+    options = {"t": t, "dt": dt, "newton": EXACT} | more
+    runs = [ub.simulate(x, scheme, **options) for x in (plane, copy.scene)]
+    for name, difference, size in differences(copy, *runs, forces=forces):
+        assert difference <= tolerance * size, name
+    return runs
 
 
 def differences(copy, plane, space, *, forces):

@@ -60,7 +60,7 @@ def relative_error(a, b):
 
 def errors(model, at, scheme, of=history, changes=CHANGES, enough=0.0, **options):
     """Least relative error of the derivative by each parameter; no further below ``enough``."""
-    run = ub.differentiate(model, at, scheme, newton=TIGHT, progress=False, **options)
+    run = ub.differentiate(model, at, scheme, newton=TIGHT, **options)
     found, least = run.of(of), dict.fromkeys(at, np.inf)
     for k, name in enumerate(at):
         for fd in differences(model, at, name, of, scheme, changes, **options):

@@ -52,7 +52,7 @@ def place(t):
 
 def simulated(scheme, until=END, scene=crane, **options):
     """A run of a scene."""
-    return ub.simulate(scene(), scheme, t=(0, until), dt=DT, progress=False, **options)
+    return ub.simulate(scene(), scheme, t=(0, until), dt=DT, **options)
 
 
 def crossed(folder, until=END):

@@ -38,9 +38,7 @@ ROUGH = (
 
 BASES = ("cantilever", "chain", "portal")
 
-COLUMN = (
-    "shape", "pinned", "degree", "refined", "potential", "newton", "propped", "side_spring",
-)  # fmt: skip
+COLUMN = ("shape", "pinned", "degree", "refined", "potential", "newton", "propped", "side_spring")
 """Features that leave a straight column straight under a load along it; every 16th seed is one."""
 
 RANDOM = re.compile(r"<(\S+) (\S+?)(?: (\S+))?>|\[\[(.*?)\]\](?!\])|TIME")

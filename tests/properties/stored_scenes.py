@@ -109,9 +109,8 @@ class Draft:
             warnings.simplefilter("ignore", ub.ModelWarning)
             if self.control is not None:
                 return scene, ub.follow(
-                    scene, self.control, steps=25, mesh=self.mesh, newton=EXACT, progress=False,
-                    comm=MPI.COMM_SELF,
-                )  # fmt: skip
+                    scene, self.control, steps=25, mesh=self.mesh, newton=EXACT, comm=MPI.COMM_SELF
+                )
             return scene, ub.simulate(
                 scene, self.scheme, t=(0.0, self.end), dt=self.dt, mesh=self.mesh, newton=EXACT,
                 comm=MPI.COMM_SELF,

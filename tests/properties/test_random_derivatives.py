@@ -19,7 +19,7 @@ import ufl_beam as ub
 
 pytestmark = [pytest.mark.serial, pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")]
 
-FEW = 4, 5, 6, 12, 18, 33, 47, 49, 52, 70, 72, 99
+FEW = 4, 5, 6, 12, 18, 47, 52, 70, 72, 99
 """Combinations with laws, hinges, connectors, joints, statics and dynamics, of a second each."""
 
 REASONS = (
@@ -95,7 +95,7 @@ def outcome(one):
 
 def compare(one, newton):
     """The same with given tolerances."""
-    options = {"newton": newton, "progress": False, **one.run}
+    options = {"newton": newton, **one.run}
     try:
         found = ub.differentiate(one.model, {"x": 1.0}, **options)
     except ub.ConvergenceError as error:
@@ -150,12 +150,12 @@ def test_reasons_of_refusals(seed, reason):
     assert re.match(REASONS[reason], found.words, re.DOTALL), found
 
 
-@pytest.mark.parametrize("seed", [4, 5, 6, 12, 18, 47, 49, 52, 70, 72])
+@pytest.mark.parametrize("seed", FEW[:-1])
 def test_adjoint_is_the_direct_derivative(seed):
     """Of a random sum of motions at all times, which differences of `of` know to about 1e-9."""
     one, random = case(seed), np.random.default_rng(seed)
     run = {"newton": TIGHT, **one.run}
-    found = ub.differentiate(one.model, {"x": 1.0}, progress=False, **run)
+    found = ub.differentiate(one.model, {"x": 1.0}, **run)
     direct = found.of(lambda s: s.q)[..., 0]
     times = random.normal(size=len(direct))
     dofs = random.choice(direct.shape[1], 3, replace=False)

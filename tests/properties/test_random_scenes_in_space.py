@@ -44,7 +44,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 
 def run(one, *, t=(0.0, 1.0), start=None, **more):
     """The solution of a part of the steps of a scene, and the words of its failure."""
-    arguments = {"dt": one.steps, "newton": EXACT, "start": start, "progress": False} | more
+    arguments = {"dt": one.steps, "newton": EXACT, "start": start} | more
     try:
         ends = tuple(STEPS * one.dt * x for x in t)
         return ub.simulate(one.scene, one.scheme, t=ends, **arguments), ""
@@ -222,7 +222,7 @@ def derivative(one, solution):
     slow = isinstance(scheme, ub.EnergyMomentumDecaying) or getattr(scheme, "order", 2) > 2
     if one.seed % 10 or one.steps != one.dt or inelastic or slow:
         return
-    arguments = {"t": (0, STEPS * one.dt), "dt": one.dt, "newton": TIGHT, "progress": False}
+    arguments = {"t": (0, STEPS * one.dt), "dt": one.dt, "newton": TIGHT}
 
     def model(x):
         return built(one.seed, factor=x).scene

@@ -112,7 +112,9 @@ def test_tangent_is_the_derivative(name, scheme):
     require_tangent(LAWS[name], scheme, steps, 1e-7, tolerance, state=1e-4)
 
 
-@pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
+@pytest.mark.parametrize(
+    ("name", "scheme"), zip([*LAWS, "creeping", "hole"], SCHEMES, strict=True), ids=str
+)
 def test_the_reference_finds_the_same(name, scheme, as_by_reference):
     """The ledger of exact schemes closes, also where a step passes the edge of a hole."""
     _, (connector,), scene = cantilever(LAWS[name])
@@ -186,7 +188,7 @@ def thrown(connector, v, spin=0.0):
     return ub.Scene(bodies=[BODY], connectors=[connector], initial=[start])
 
 
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentumDecaying(), ub.Newmark()], ids=str)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Newmark()], ids=str)
 @pytest.mark.parametrize("damping", [0.0, 2.0])
 def test_on_a_line_it_is_a_stop(scheme, damping):
     """A pin that runs to and fro across the hole, in any direction [closed]."""

@@ -67,7 +67,7 @@ WITHIN = {"a": (1.0, -10.0, 10.0), "b": (1.0, -10.0, 10.0)}
 
 def fit(measured, parameters=WITHIN, model=pushed, **options):
     several = [measured] if isinstance(measured, st.Measurement) else measured
-    return st.calibrate(model, parameters, several, progress=False, **options)
+    return st.calibrate(model, parameters, several, **options)
 
 
 def warned(pattern):
@@ -202,9 +202,7 @@ def test_interpolation_at_fourth_order_is_of_sixth_order():
     beam = ub.Beam((0, 0), (3, 0), section, cells=1, name="beam")
     load = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda s: np.sin(s) ** 4)
     scene, fourth = clamped(beam, loads=[load]), ub.EnergyMomentum(order=4)
-    fine, coarse = (
-        ub.simulate(scene, fourth, t=(0, 3), dt=dt, progress=False) for dt in (0.01, 0.1)
-    )
+    fine, coarse = (ub.simulate(scene, fourth, t=(0, 3), dt=dt) for dt in (0.01, 0.1))
     options = {"quantity": tip, "scheme": fourth, "t": (0, 3), "dt": 0.1}
     at = measurement(np.zeros(301), times=fine.times, **options)
     steps = np.abs(tip(coarse) - tip(fine)[::10]).max()
@@ -226,7 +224,7 @@ def test_effects_without_derivatives_have_differences_of_runs(b, start):
     """Estimates of a linear problem; one-sided at the bound 2 of b, and where runs fail."""
 
     def forces(**at):
-        run = ub.simulate(controlled(**at), ub.Static(), t=(0, 1), dt=0.025, progress=False)
+        run = ub.simulate(controlled(**at), ub.Static(), t=(0, 1), dt=0.025)
         return force(run)
 
     measured = measurement(forces(a=2.0, b=b), sigma=SIGMA)
@@ -244,7 +242,7 @@ def test_a_first_row_without_a_value_is_left_out():
     options = {"quantity": acceleration, "scheme": ub.EnergyMomentum(), "t": (0, 0.1), "dt": 1e-3}
     times = np.array([0.01, 0.02, 0.03])
     later = measurement([1.0, 2.0, 3.0], times=times, **options)
-    run = ub.simulate(single(2.0), ub.EnergyMomentum(), t=(0, 0.1), dt=1e-3, progress=False)
+    run = ub.simulate(single(2.0), ub.EnergyMomentum(), t=(0, 0.1), dt=1e-3)
     np.testing.assert_allclose(later.computed(run), acceleration(run)[[10, 20, 30]], rtol=1e-9)
     early = measurement([1.0, 2.0], times=[0.0, 0.1], **options)
     with raises("quantity returned nan at the beginning", "before 0.001"):
@@ -314,7 +312,7 @@ def rubbing(limit, hardening):
 def test_a_search_goes_on_where_computed_values_jump(start):
     """They jump where friction sticks in another step; the cost there is 12 % above the least."""
     options = {"scheme": ub.EnergyMomentum(0.05, 0.05), "t": (0, 0.5), "dt": 2.5e-3}
-    run = ub.simulate(rubbing(300.0, 500.0), progress=False, **options)
+    run = ub.simulate(rubbing(300.0, 500.0), **options)
     times, random = np.arange(0.01, 0.5, 0.01), np.random.default_rng(1)
     values = np.interp(times, run.times, tip(run))
     values += 0.002 * np.abs(values).max() * random.normal(size=len(times))
@@ -378,7 +376,7 @@ def test_failed_runs_shorten_the_step_of_the_search():
         return run.reaction(run.scene.supports[0])[:, 2]
 
     options = {"quantity": moment, "scheme": ub.Static(), "t": (0, 1), "dt": 0.25, "sigma": 0.01}
-    run = ub.simulate(model(2.45), ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(model(2.45), ub.Static(), t=(0, 1), dt=0.25)
     measured = measurement(moment(run), times=run.times, **options)
     result = fit(measured, {"a": (0.1, 0.01, 100.0)}, model, starts=4)
     assert result.failed > 0

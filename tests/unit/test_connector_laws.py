@@ -11,13 +11,12 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from compiled_law import require_tangent
-from helpers import in_turn, law_of, raises, require_restart
+from helpers import in_turn, law_of, raises
 from scenes import clamped
 from scipy.integrate import solve_ivp
 from user_classes import Stiffening as Cubic
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import lib
 
 f = ub.extend.law_functions
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
@@ -221,19 +220,6 @@ def test_a_maxwell_element_relaxes(scheme, order):
         errors.append(math.sqrt(2 * k * solution.energy["stored"][-1]) - force)
         assert solution.connector(connector).dissipated[-1] > 0
     np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.1)
-
-
-def test_restart_and_start(shared_path):
-    """All steps are taken in C."""
-    _, connectors, scene = cantilever(*LAWS.values(), Drive(0.05))
-    scheme = ub.EnergyMomentum(0.1, 0.1)
-    whole = require_restart(run, scene, connectors, scheme, shared_path, until=0.4)
-    assert whole.energy.worst < 1e-9
-    simulation = ub.Simulation(scene, scheme)
-    python = {lib.phase_in_python, lib.run_in_python, lib.begin_in_python}
-    phases = [loop for one in simulation.equation.phases for loop in (*one.begin, *one.accept)]
-    assert not python & {function for function, _ in phases}
-    simulation.close()
 
 
 def test_motions_of_all_kinds(as_by_reference):

@@ -24,10 +24,10 @@ EXACT = 1e-9
 AGREE = 1e-7
 """Differences of runs have 8 to 10 digits at the best change of the parameter."""
 
-TO_THE_DIGITS = {"newton": TIGHT, "progress": False}
+TO_THE_DIGITS = {"newton": TIGHT}
 RUN = {"t": (0, 1), "dt": 0.25, **TO_THE_DIGITS}
 DYNAMIC = {"t": (0, 0.6), "dt": 0.01, **TO_THE_DIGITS}
-SHORT = {"t": (0, 0.02), "dt": 0.01, "progress": False}
+SHORT = {"t": (0, 0.02), "dt": 0.01}
 DAMPED = ub.EnergyMomentum(0.05)
 
 
@@ -75,9 +75,8 @@ def test_an_oscillator_by_the_midpoint_rule():
     """u_n = v0 sin(n φ)/ω with φ = 2 arctan(ω dt/2), the closed form of the midpoint rule."""
     k, m, v0, dt, n = 20.0, 3.0, 0.4, 0.05, np.arange(41)
     run = ub.differentiate(
-        swinging, {"k": k, "m": m, "v0": v0}, ub.EnergyMomentum(),
-        t=(0, 2), dt=dt, **TO_THE_DIGITS,
-    )  # fmt: skip
+        swinging, {"k": k, "m": m, "v0": v0}, ub.EnergyMomentum(), t=(0, 2), dt=dt, **TO_THE_DIGITS
+    )
     ω = math.sqrt(k / m)
     φ, slope = 2 * math.atan(ω * dt / 2), dt / (1 + (ω * dt / 2) ** 2)
     u, v = v0 / ω * np.sin(n * φ), v0 * np.cos(n * φ)

@@ -110,7 +110,7 @@ def forces(s):
     return np.array([[x.N, x.V, x.M] for x in diagrams])
 
 
-TO_THE_DIGITS = {"newton": TIGHT, "progress": False}
+TO_THE_DIGITS = {"newton": TIGHT}
 
 
 @cache
@@ -165,7 +165,7 @@ def disagreements(first, second, schemes, quantities, enough, unused=("mass",)):
         (loaded, ub.EnergyMomentumPrinted()),
         (loaded, ub.EnergyMomentumStatic(0.7)),
         (yielding, ub.GeneralizedAlpha(0.7)),
-        (machine, ub.EnergyMomentumDecaying()),
+        (machine, ub.EnergyMomentum(0.05, 0.05)),
         (machine, ub.EnergyMomentumStatic(0.7)),
         (smooth, ub.Newmark()),
         (smooth, ub.EnergyMomentum(order=4)),  # without energies

@@ -61,10 +61,7 @@ def steel02(strains, E, Fy, b, R0=20.0, cR1=0.925, cR2=0.15, a1=0.0, a2=1.0, a3=
     return stresses
 
 
-STEELS = {
-    "kinematic": (3.0, 0.02),
-    "isotropic": (2.0, 0.05, 15.0, 0.9, 0.2, 0.3, 2.0, 0.2, 3.0),
-}
+STEELS = {"kinematic": (3.0, 0.02), "isotropic": (2.0, 0.05, 15.0, 0.9, 0.2, 0.3, 2.0, 0.2, 3.0)}
 
 
 @each_scheme

@@ -50,7 +50,7 @@ def test_a_stored_solution_is_read_and_not_continued(name):
 
 
 def continued(run, scheme):
-    return ub.simulate(run.scene, scheme, t=(END, 2 * END), dt=DT, start=run, progress=False)
+    return ub.simulate(run.scene, scheme, t=(END, 2 * END), dt=DT, start=run)
 
 
 @pytest.mark.parametrize(("table", "owner"), [("cells", "deck"), ("Coulomb", "Slide")])

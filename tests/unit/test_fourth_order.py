@@ -210,7 +210,7 @@ def test_derivatives_of_stages_are_taken_back_with_a_step_that_is_divided():
         turn = ub.Turn(ub.ground(0, 0), beam.start, ub.PrescribedMotion(lambda t: rate * t**2))
         return ub.Scene([beam], joints=[pin], loads=[ub.Gravity()], connectors=[turn])
 
-    options = {"t": (0, 2.0), "dt": 0.5, "newton": ub.Newton(max_iterations=4), "progress": False}
+    options = {"t": (0, 2.0), "dt": 0.5, "newton": ub.Newton(max_iterations=4)}
     found = ub.differentiate(swing, at := defaults(swing), FOURTH, **options)
     assert found.solution.substeps > len(found.solution)
     slopes = found.of(lambda s: s.q)

@@ -168,7 +168,7 @@ def parameters(model):
 def compare(model, scheme, of, reduce=LAST, rtol=1e-8, atol=0.0, max_bytes=1e9, **run):
     """Require the direct derivatives of the adjoint, by relative changes; return them."""
     at = parameters(model)
-    direct = ub.differentiate(model, at, scheme, progress=False, **run)
+    direct = ub.differentiate(model, at, scheme, **run)
     more = {"of": of, "reduce": reduce, "max_bytes": max_bytes}
     _, found = ub.gradient(model, at, scheme, **more, **run)
     sizes = np.array([*at.values()])
@@ -296,7 +296,7 @@ def test_a_derivative_does_not_depend_on_other_parameters(name):
     model, scheme, end, dt = CASES[name]
 
     def derivatives(at):
-        return ub.differentiate(model, at, scheme, t=(0.0, end / 4), dt=dt, progress=False).of(tip)
+        return ub.differentiate(model, at, scheme, t=(0.0, end / 4), dt=dt).of(tip)
 
     together = derivatives(parameters(model))
     for k, (key, value) in enumerate(parameters(model).items()):

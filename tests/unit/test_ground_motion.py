@@ -218,5 +218,5 @@ def test_adaptive_steps_end_at_samples_of_a_record():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1e3, rhoA=1.0, rhoI=1.0))
     foot = ub.PrescribedDisplacement(beam.start, u=0.0, v=motion.displacement, psi=0.0)
     scene = ub.Scene([beam], supports=[foot])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=ub.Adaptive(1e-2), progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=ub.Adaptive(1e-2))
     assert {0.25, 0.5, 0.75} <= set(run.times)

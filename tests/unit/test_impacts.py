@@ -26,7 +26,7 @@ MASS = ub.Body((0, 0), mass=2.0, inertia=1.0)
 
 
 def simulate(scene, scheme=EXACT_LEDGER[0], t=(0, 1), dt=0.01, **options):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **options)
+    return ub.simulate(scene, scheme, t=t, dt=dt, **options)
 
 
 def led(u, *connectors):

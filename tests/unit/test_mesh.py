@@ -92,10 +92,7 @@ FIVE = "5 cells between arm.at(0.25) (0.75, 2) and arm.end (3, 2)", "arm can tak
             lambda: ub.Mesh(Fraction(1, 2)).vertices(straight(6, name="left"), [0.5]),
             ["left can take multiples of Fraction(1, 3)"],
         ),
-        (
-            lambda: bend(portal(), start=bend(portal(), 2)),
-            ["other beams or another mesh"],
-        ),
+        (lambda: bend(portal(), start=bend(portal(), 2)), ["other beams or another mesh"]),
     ],
 )
 def test_wrong_meshes_are_refused(make, parts):

@@ -126,8 +126,7 @@ CIRCLE = partial(ub.Section.circle, 0.1, E=1e9, nu=0.3)
 
 
 @pytest.mark.parametrize(
-    ("forgotten", "stated"),
-    [(ub.Section(**LIGHT), MASSLESS), (CIRCLE(), CIRCLE(rho=0.0))],
+    ("forgotten", "stated"), [(ub.Section(**LIGHT), MASSLESS), (CIRCLE(), CIRCLE(rho=0.0))]
 )
 def test_a_forgotten_density(forgotten, stated):
     """Of one section beside others; stated as zero it is meant, as in cables of a swing."""

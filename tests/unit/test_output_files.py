@@ -121,10 +121,7 @@ def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
 
 @pytest.mark.parametrize(
     ("path", "message"),
-    [
-        ("a\0b.csv", "embedded null"),
-        ("x" * 300, "cannot be written: File name too long"),
-    ],
+    [("a\0b.csv", "embedded null"), ("x" * 300, "cannot be written: File name too long")],
 )
 def test_names_that_are_none(path, message, shared_path, monkeypatch):
     monkeypatch.chdir(shared_path)

@@ -127,7 +127,7 @@ import ufl_beam as ub
 beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3), cells=2)
 load = ub.PointLoad(beam.end, force=(0.0, 0.1))
 scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.1), dt=0.01, progress=False)
+solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.1), dt=0.01)
 assert solution.energy.worst < 1e-9  # the ledger closes
 print(ub.__file__, ub.__version__, sep="\\n")
 """

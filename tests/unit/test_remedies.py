@@ -107,7 +107,7 @@ def test_a_measure_without_numbers_ends_an_incremental_dynamic_analysis():
 
     with raises("measure returned nan, not finite numbers", "up to t = "):
         st.incremental_dynamic_analysis(
-            build, [MOTION], [1.0, 2.0, 3.0], lambda s: math.nan, limit=1.0, progress=False
+            build, [MOTION], [1.0, 2.0, 3.0], lambda s: math.nan, limit=1.0
         )
     assert len(built) == 2
 
@@ -139,10 +139,7 @@ def gradient(F=-1e5, of=tip, **more):
         ({"of": lambda s: np.zeros((len(s), 2))}, ["last value", "shape (3, 2)"]),
         ({"of": lambda s: ["a"] * len(s)}, ["of returned ['a'", "history of real numbers"]),
         ({"of": lambda s: 1j * tip(s)}, ["of returned array(", "history of real numbers"]),
-        (
-            {"of": lambda s: [[1.0], [1.0, 2.0], [1.0]]},
-            ["of returned [[1.0]", "real numbers"],
-        ),
+        ({"of": lambda s: [[1.0], [1.0, 2.0], [1.0]]}, ["of returned [[1.0]", "real numbers"]),
     ],
 )
 def test_gradients_need_histories_of_numbers_and_one_number(more, words):
@@ -169,7 +166,7 @@ def test_the_wall_time_of_a_tradeoff_ends_a_run_in_progress(dt):
     with raises("max_seconds = 1 s", kind=errors.TradeoffError):
         ub.tradeoff(
             scene, {"tip": lambda s: s.displacement(BEAM.end)[-1, 0]}, scheme=ub.EnergyMomentum(),
-            t=(0, 10), dt=dt, tolerance=1e-3, max_seconds=1.0, progress=False,
+            t=(0, 10), dt=dt, tolerance=1e-3, max_seconds=1.0,
         )  # fmt: skip
     assert len(calls) < 250  # 50 in a second; the coarsest run has 1000 steps or more
 
@@ -190,7 +187,7 @@ def test_a_pushover_that_ends_early_says_so_briefly():
         masses=[ub.PointMass(c.end, 10.0) for c in columns],
     )
     with pytest.warns(ub.ModelWarning, match="the path ends at"):
-        capacity = st.pushover(scene, columns[0].end, 40.0, steps=40, progress=False)
+        capacity = st.pushover(scene, columns[0].end, 40.0, steps=40)
     # Eight names of 40 characters, 400 characters of the error, and the sentence around them
     assert len(capacity.failure) < 1000
     assert " more" in capacity.failure

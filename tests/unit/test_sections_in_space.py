@@ -215,7 +215,7 @@ def cantilever(section, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), name="rai
 
 
 def tip(scene):
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
     return run.displacement(scene.beams[0].end)[-1]
 
 
@@ -283,7 +283,7 @@ def test_files_without_the_fields_are_read():
     """Also if they are compared with a scene whose sections have them."""
     girder = ub.Beam((0, 0), (3, 0), st.steel("IPE 300"), cells=4)
     scene = ub.Scene([girder], supports=[ub.Clamped(girder.start)])
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
 
     def old():
         content = run._content() | {"scene": to_data(scene)}

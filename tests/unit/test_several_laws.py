@@ -2,12 +2,11 @@
 """Sections whose laws are of several classes; cores, and bars that displace concrete."""
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
 from dolfinx import fem
-from helpers import raises, require_restart
+from helpers import raises
 from scenes import clamped
 from user_laws import SameHardening
 
@@ -88,14 +87,6 @@ def test_one_law_in_two_classes_is_one_law(pair, scheme):
     one, two = (run(make(each), scheme, t=t, dt=dt) for each in PAIRS[pair])
     assert two.energy["plastic"][-1] > 0
     assert_same(two, one)
-
-
-def test_runs_continue(shared_path):
-    scene, fine = kicked(PAIRS["cracks"][1]), partial(run, dt=0.01)
-    whole = require_restart(fine, scene, [], ub.EnergyMomentum(), shared_path, until=0.2)
-    whole.save(shared_path / "run.solution")
-    loaded = ub.Solution.load(shared_path / "run.solution", scene=scene)
-    assert_same(loaded, whole, digits=0.0)
 
 
 def test_forms_in_dolfinx():

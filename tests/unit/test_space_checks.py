@@ -22,7 +22,7 @@ FOOT = ub.Clamped(ARM.start)
 
 
 def run(scene, scheme=None):
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, progress=False)
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Defects that random combinations in space had, see ``tests/properties``."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from into_space import EXACT, SKEW, InSpace, same_in_space
 from test_space_analysis import flat_modes
 from test_space_inelastic import (
-    EXACT,
     OTHER,
     RESULTANTS,
     SIX,
@@ -19,13 +21,9 @@ from test_space_inelastic import (
 
 import ufl_beam as ub
 
-RUN = {"newton": EXACT, "progress": False}
+RUN = {"newton": EXACT}
 YIELDING = RESULTANTS["bending"]
 SECTION = ub.Section(**STIFF, **OTHER)
-
-
-def section(at, **laws):
-    return ub.Section(**STIFF, **({} if at is in_plane else OTHER), **laws)
 
 
 @pytest.mark.parametrize("axes", [{"along": (1, 2, 2)}, {"axis": (0, 0, 1)}], ids=str)
@@ -50,13 +48,10 @@ def test_a_fixed_place_in_turned_axes_stays_after_start(axes):
 
 
 def test_modes_about_a_yielded_state_are_those_of_the_plane():
-    both = []
-    for at in (in_plane, skew):
-        scene = cantilever(section(at, **YIELDING), at, amplitude=lambda t: 3 * t)
-        state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, **RUN)
-        assert state.material(scene.beams[0]).plastic.sum() > 0
-        both.append(ub.modes(scene, 3 if at is in_plane else 12, at=state))
-    plane, space = both
+    column = cantilever(ub.Section(**STIFF, **YIELDING), in_plane, amplitude=lambda t: 3 * t)
+    states = same_in_space(column, ub.Static())
+    assert states[0].energy["plastic"][-1] > 0
+    plane, space = (ub.modes(x.scene, n, at=x) for x, n in zip(states, (3, 12), strict=True))
     found = np.flatnonzero(flat_modes(space))[:3]
     assert np.abs(space.omega[found] / plane.omega - 1).max() < 1e-9
 
@@ -85,7 +80,7 @@ def test_reference_solver_with_inelastic_beams(kind, scheme):
         made, size = square(4, 0.1, ub.ElastoPlastic(355e6, isotropic=5e9)), 4e4
     scene = cantilever(made, skew, amplitude=lambda t: 20 * t, size=size)
     ordinary, plain = (
-        ub.simulate(scene, scheme, t=(0, 0.1), dt=0.005, newton=newton, progress=False)
+        ub.simulate(scene, scheme, t=(0, 0.1), dt=0.005, newton=newton)
         for newton in (EXACT, ub.Newton(rtol=1e-12, reference=True))
     )
     end = scene.beams[0].end
@@ -101,15 +96,13 @@ def test_reference_solver_with_friction_by_the_force_of_a_joint():
     """The limit of a step has the force of the step before, in both solvers."""
     ball, foot = ub.Body((0, 0, 0), mass=2.0, inertia=(1, 1, 1)), ub.ground(0, 0, 0)
     rail = ub.Prismatic(foot, ball.middle, axis=(1, 0, 0))
-    rubbing = ub.Slide(
-        foot, ball.middle, ub.Coulomb(coefficient=0.1, joint=rail), axis=(1, 0, 0)
-    )  # fmt: skip
+    rubbing = ub.Slide(foot, ball.middle, ub.Coulomb(coefficient=0.1, joint=rail), axis=(1, 0, 0))
     scene = ub.Scene(
         bodies=[ball], joints=[rail], connectors=[rubbing], loads=[ub.Gravity((0, 0, -9.81))],
         initial=[ub.Velocity([ball], linear=(3, 0, 0), angular=(0, 0, 0), about=(0, 0, 0))],
     )  # fmt: skip
     forces = [
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.05, newton=newton, progress=False)
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.05, newton=newton)
         .connector(rubbing).force
         for newton in (EXACT, ub.Newton(rtol=1e-12, reference=True))
     ]  # fmt: skip
@@ -119,16 +112,11 @@ def test_reference_solver_with_friction_by_the_force_of_a_joint():
 
 def test_viscosity_may_begin_with_start():
     """As in the plane, also beside laws."""
-    ends = []
-    for at in (in_plane, skew):
-        scene = cantilever(section(at, **YIELDING), at, amplitude=push)
+    ends, plane = [], cantilever(ub.Section(**STIFF, **YIELDING), in_plane, amplitude=push)
+    for scene in (plane, InSpace(plane, SKEW).scene):
         first = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, **RUN)
-        damped = ub.Scene(
-            scene.beams, supports=scene.supports, loads=scene.loads, damping=[ub.KelvinVoigt(0.02)]
-        )
-        second = ub.simulate(
-            damped, ub.EnergyMomentum(), t=(0.5, 1), dt=0.02, start=first, **RUN
-        )  # fmt: skip
+        damped = replace(scene, damping=[ub.KelvinVoigt(0.02)])
+        second = ub.simulate(damped, ub.EnergyMomentum(), t=(0.5, 1), dt=0.02, start=first, **RUN)
         assert second.energy.worst < 1e-12
         assert second.energy["damping"][-1] > 0
         ends.append(second.position(scene.beams[0].end))

@@ -101,7 +101,7 @@ def in_both(scene, scheme, options, *, dt=None, steps=100, refine=1, control=Non
     """Run a scene of a demo in the plane and in a skew plane; yield their differences."""
     kept = getattr(control(scene), "component", "") if control else ""
     copy, runs = InSpace(scene, KEEPING.get(kept, SKEW)), []
-    more = {"newton": EXACT, "mesh": ub.Mesh(refine=refine), "progress": False}
+    more = {"newton": EXACT, "mesh": ub.Mesh(refine=refine)}
     for x in (scene, copy.scene):
         if control:
             runs.append(ub.follow(x, control(x), steps=20, **more))

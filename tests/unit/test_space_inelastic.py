@@ -1,38 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Inelastic beams in space: equality with the plane, fibres, hinges, balances, restart."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 import pytest
+from into_space import EXACT, SKEW, same_in_space
 from scipy.spatial.transform import Rotation
+from test_space import OTHER, STIFF
+from user_laws import SameHardening
 
 import ufl_beam as ub
 import ufl_beam.structures as st
 from ufl_beam.model.constraint_checks import parts_that_switch
-
-EXACT = ub.Newton(rtol=1e-13)
-TURN = Rotation.from_rotvec([0.3, -0.7, 1.1])
-STIFF = {"EA": 1e4, "GA": 1e4, "EI": 500.0, "rhoA": 1.0, "rhoI": 10.0}
-OTHER = {"GA3": 7e3, "EI2": 300.0, "GJ": 400.0, "rhoI2": 6.0}
-
-
-@dataclass(frozen=True)
-class Maxwell(ub.extend.MaterialLaw):
-    """A spring and a damper in series, of a user."""
-
-    tau: float
-    variables: ClassVar = {"flow": 0.0}
-
-    def residuals(self, strain, old, new, dt):
-        return {"flow": new.flow - old.flow - dt / self.tau * (strain - new.flow)}
-
-    def stress(self, strain, state):
-        return self.C * (strain - state.flow)
-
-    def elastic_energy(self, strain, state):
-        return self.C / 2 * (strain - state.flow) ** 2
 
 
 def in_plane(x, y):
@@ -40,7 +18,7 @@ def in_plane(x, y):
 
 
 def skew(x, y):
-    return tuple(TURN.apply([x, y, 0.0]))
+    return tuple(SKEW.apply([x, y, 0.0]))
 
 
 def cantilever(section, at, *, amplitude, hinges=None, size=1.0, damping=()):
@@ -48,35 +26,18 @@ def cantilever(section, at, *, amplitude, hinges=None, size=1.0, damping=()):
     up = {} if at is in_plane else {"up": at(-3, 4)}
     beam = ub.Beam(at(1, 0), at(5, 3), section, cells=5, hinges=hinges or {}, **up)
     load = ub.PointLoad(beam.end, force=at(-3 * size, 4 * size), amplitude=amplitude)
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[*damping]
-    )  # fmt: skip
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[*damping])
 
 
-def in_both(scheme, laws, *, end=1.0, amplitude, tolerance=1e-12, **more):
-    """Run a cantilever in the plane and in a skew plane; check that motions and energies are equal.
+def in_both(scheme, laws, *, end=1.0, **more):
+    """Run a cantilever in the plane and in a skew plane, whose results are equal."""
+    plane = cantilever(ub.Section(**STIFF, **laws), in_plane, **more)
+    return same_in_space(plane, scheme, t=(0, end), dt=0.02)
 
-    Residuals are solved to 1e-13 of the forces.  ``tolerance`` is relative.
-    """
-    section, other = (ub.Section(**STIFF, **x, **laws) for x in ({}, OTHER))
-    runs = [
-        ub.simulate(
-            cantilever(x, at, amplitude=amplitude, **more), scheme, t=(0, end), dt=0.02,
-            newton=EXACT, progress=False,
-        )
-        for x, at in ((section, in_plane), (other, skew))
-    ]  # fmt: skip
-    plane, space = (run.displacement(run.scene.beams[0].end) for run in runs)
-    moved, turned = TURN.inv().apply(space[:, :3]), TURN.inv().apply(space[:, 3:])
-    size = runs[0].scene.size
-    assert np.abs(moved[:, :2] - plane[:, :2]).max() < tolerance * size
-    assert np.abs(moved[:, 2]).max() < tolerance * size
-    assert np.abs(turned - plane[:, 2:] * [[0, 0, 1]]).max() < tolerance
-    one, other = (run.energy for run in runs)
-    for name in one:
-        if name != "loads":
-            assert np.abs(one[name] - other[name]).max() < tolerance * one["loads"].max(), name
-    return runs
+
+def same_histories(one, other):
+    for a, b in zip(one, other, strict=True):
+        assert np.abs(a - b).max() < 1e-11 * max(1.0, np.abs(a).max())
 
 
 def push(t):
@@ -100,7 +61,7 @@ RESULTANTS = {
     "Duvaut-Lions": {"bending": ub.ElastoPlastic(8.0, viscosity=ub.DuvautLions(tau=0.1))},
     "Ramberg-Osgood": {"bending": st.RambergOsgood(8.0, offset=0.002, exponent=5.0)},
     "Armstrong-Frederick": {"bending": st.ArmstrongFrederick(8.0, 100.0, 10.0)},
-    "Maxwell": {"bending": Maxwell(tau=0.1)},
+    "by residuals": {"bending": SameHardening(8.0, 20.0, 30.0, 1.0)},
     "hinge of the section": {"hinge": ub.LinearSoftening(8.0, fracture_energy=10.0)},
 }  # fmt: skip
 
@@ -138,13 +99,10 @@ def test_schemes_have_the_same_motion_in_space(scheme):
     ids=str,
 )
 def test_hinges_of_zero_length_have_the_same_motion_in_space(law):
-    hinges = {0.0: law, 0.4: law}
-    runs = in_both(ub.EnergyMomentum(), {}, amplitude=push, hinges=hinges)
+    runs = in_both(ub.EnergyMomentum(), {}, amplitude=push, hinges={0.0: law, 0.4: law})
     histories = [[run.connector(x) for x in run.scene.hinges] for run in runs]
     for one, other in zip(*histories, strict=True):
-        for field in ("motion", "force", "dissipated"):
-            a, b = getattr(one, field), getattr(other, field)
-            assert np.abs(a - b).max() < 1e-11 * max(1.0, np.abs(a).max())
+        same_histories(one, other)
     assert max(np.ptp(one.motion) for one in histories[0]) > 0.01, "a hinge turns"
 
 
@@ -163,7 +121,7 @@ def test_creep_under_torsion_in_space():
     scene = ub.Scene(
         [beam], supports=[ub.Clamped(beam.start)], loads=[load], damping=[ub.KelvinVoigt(τ)]
     )  # fmt: skip
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, newton=EXACT)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, newton=EXACT)
     angle = run.displacement(beam.end)[:, 3:] @ axis
     exact = 4.0 * 3.0 / 400.0 * (1 - (1 + dt / τ) ** -np.arange(11.0))
     assert np.abs(angle - exact).max() < 1e-12
@@ -185,27 +143,17 @@ SPRINGS = {
 
 @pytest.mark.parametrize("name", SPRINGS)
 def test_hinges_at_joints_have_the_same_motion_in_space(name):
-    runs = []
-    for at in (in_plane, skew):
-        flat = at is in_plane
-        section = ub.Section(**STIFF, **({} if flat else OTHER))
-        beam = ub.Beam(at(1, 0), at(5, 3), section, cells=3, **({} if flat else {"up": at(-3, 4)}))
-        axis = {} if flat else {"axis": tuple(TURN.apply([0, 0, 1.0]))}
-        places = ub.ground(*at(1, 0)), beam.start
-        load = ub.PointLoad(beam.end, force=at(-3, 4), amplitude=push)
-        scene = ub.Scene(
-            [beam], joints=[ub.Revolute(*places, **axis)], loads=[load],
-            connectors=[ub.Turn(*places, SPRINGS[name], **axis)],
-        )  # fmt: skip
-        runs.append(
-            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02, newton=EXACT, progress=False)
-        )
+    beam = ub.Beam((1, 0), (5, 3), ub.Section(**STIFF), cells=3)
+    places = ub.ground(1, 0), beam.start
+    scene = ub.Scene(
+        [beam], joints=[ub.Revolute(*places)], connectors=[ub.Turn(*places, SPRINGS[name])],
+        loads=[ub.PointLoad(beam.end, force=(-3, 4), amplitude=push)],
+    )  # fmt: skip
+    runs = same_in_space(scene, ub.EnergyMomentum(), dt=0.02)
     one, other = (run.connector(run.scene.connectors[0]) for run in runs)
     assert np.ptp(one.motion) > 0.05
     assert one.dissipated[-1] > 0.01
-    for field in ("motion", "force", "work", "dissipated"):
-        a, b = getattr(one, field), getattr(other, field)
-        assert np.abs(a - b).max() < 1e-11 * max(1.0, np.abs(a).max())
+    same_histories(one, other)
     largest = runs[1].energy["loads"].max()
     assert np.abs(runs[1].energy.imbalance).max() < 1e-12 * largest
 
@@ -245,8 +193,7 @@ def flight(turn, **laws):
 
 def flown(turn, scheme=None, t=(0, 1.5), **more):
     return ub.simulate(
-        flight(turn, **SIX), scheme or ub.EnergyMomentum(), t=t, dt=0.02, newton=EXACT,
-        progress=False, **more,
+        flight(turn, **SIX), scheme or ub.EnergyMomentum(), t=t, dt=0.02, newton=EXACT, **more,
     )  # fmt: skip
 
 
@@ -282,10 +229,8 @@ def test_turned_scene_with_six_laws():
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], ids=str)
 def test_start_changes_no_bit(scheme):
     scene = cantilever(YIELDING, skew, amplitude=push)
-    whole, first = (
-        ub.simulate(scene, scheme, t=(0, t), dt=1 / 64, progress=False) for t in (1, 0.5)
-    )
-    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=1 / 64, start=first, progress=False)
+    whole, first = (ub.simulate(scene, scheme, t=(0, t), dt=1 / 64) for t in (1, 0.5))
+    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=1 / 64, start=first)
     for beam in scene.beams:
         assert (whole.displacement(beam.end)[-1] == second.displacement(beam.end)[-1]).all()
         for field in ("forces", "plastic"):
@@ -304,9 +249,7 @@ def test_restart_changes_no_bit(tmp_path, scene):
     made = two_hinges() if scene == "hinges" else flight(RANDOM, **SIX)
 
     def run(end, **more):
-        return ub.simulate(
-            made, ub.EnergyMomentum(), t=(0, end), dt=1 / 64, progress=False, **more
-        )  # fmt: skip
+        return ub.simulate(made, ub.EnergyMomentum(), t=(0, end), dt=1 / 64, **more)
 
     saved = ub.Checkpoint(tmp_path / "state", every=16)
     run(0.5, checkpoint=saved)
@@ -340,9 +283,7 @@ def two_hinges():
 
 @IN_LONG_CELLS
 def test_balance_of_hinges_about_several_axes():
-    run = ub.simulate(
-        two_hinges(), ub.EnergyMomentum(), t=(0, 2), dt=0.01, progress=False, newton=EXACT
-    )
+    run = ub.simulate(two_hinges(), ub.EnergyMomentum(), t=(0, 2), dt=0.01, newton=EXACT)
     largest = run.energy["loads"].max()
     assert np.abs(run.energy.imbalance).max() < 1e-12 * largest
     connectors = [*run.scene.connectors[:2], *run.scene.hinges]
@@ -377,10 +318,10 @@ def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
     )  # fmt: skip
     if kind == "in a cell":
         with pytest.warns(ub.ModelWarning, match="turned by 329 degrees.*times too stiff"):
-            run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+            run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
         jump = np.array([run.material(beam, n).jump[0] for n in range(len(run))])
     else:
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
         jump = run.connector(turns[0] if turns else run.scene.hinges[0]).motion
     moment = -run.connector(motor).force
     opened = slice(5, None)
@@ -414,7 +355,7 @@ def test_limit_moment_of_a_square_of_fibres(m, angle, axis):
     beam = ub.Beam((0, 0, 0), (1, 0, 0), square(m, angle, law), cells=1)
     motor = ub.Turn(ub.ground(1, 0, 0), beam.end, ub.PrescribedMotion(lambda t: t), axis=axis)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[motor])
-    run = ub.simulate(scene, ub.Static(), t=(0, 0.3), dt=0.01, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 0.3), dt=0.01)
     x = (np.arange(m) + 0.5) / m - 0.5
     across = np.abs(np.add.outer(x, x)) / np.sqrt(2) if angle else np.abs(np.add.outer(x, 0 * x))
     limit = fy * a**3 * across.sum() / m**2
@@ -439,17 +380,13 @@ def test_fibres_at_z_bend_about_axis_2_as_fibres_at_y_do_in_the_plane():
     runs = []
     for section, at in ((flat, in_plane), (solid, skew)):
         # axis 2 is out of the plane, so that axis 3 is to the left
-        up = {} if at is in_plane else {"up": tuple(-TURN.apply([0, 0, 1.0]))}
+        up = {} if at is in_plane else {"up": tuple(-SKEW.apply([0, 0, 1.0]))}
         beam = ub.Beam(at(0, 0), at(1.6, 1.2), section, cells=4, **up)
         load = ub.PointLoad(beam.end, force=at(-3e4, 4e4), amplitude=lambda t: np.sin(30 * t))
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        runs.append(
-            ub.simulate(
-                scene, ub.EnergyMomentum(), t=(0, 0.2), dt=2e-3, newton=EXACT, progress=False
-            )
-        )
+        runs.append(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=2e-3, newton=EXACT))
     plane, space = (run.displacement(run.scene.beams[0].end) for run in runs)
-    moved = TURN.inv().apply(space[:, :3])
+    moved = SKEW.inv().apply(space[:, :3])
     assert np.abs(moved[:, :2] - plane[:, :2]).max() < 1e-12 * 2
     assert np.abs(moved[:, 2]).max() < 1e-12 * 2
     lost = [run.energy["plastic"][-1] for run in runs]
@@ -469,9 +406,7 @@ def test_fibres_of_large_limits_are_elastic():
         beam = ub.Beam((0, 0, 0), (2, 1, 0.5), section, cells=4)
         load = ub.PointLoad(beam.end, force=(2e5, -3e5, 4e5), moment=(5e5, 0, 0))
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        run = ub.simulate(
-            scene, ub.EnergyMomentum(), t=(0, 0.02), dt=1e-3, newton=EXACT, progress=False
-        )
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.02), dt=1e-3, newton=EXACT)
         tips.append(run.displacement(beam.end))
     assert np.abs(tips[0] - tips[1]).max() < 1e-12
 
@@ -511,10 +446,8 @@ def test_parts_that_yield_in_space_only():
 def test_start_from_a_state_in_between():
     """Elastic beams have no internal variables: the rotations of the nodes suffice."""
     scene = cantilever(ub.Section(**STIFF, **OTHER), skew, amplitude=push)
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, progress=False)
-    again = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0.04, 0.1), dt=0.02, start=(run, 2), progress=False
-    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02)
+    again = ub.simulate(scene, ub.EnergyMomentum(), t=(0.04, 0.1), dt=0.02, start=(run, 2))
     tips = [x.displacement(x.scene.beams[0].end)[-1] for x in (run, again)]
     assert np.abs(tips[0] - tips[1]).max() < 1e-10 * np.abs(tips[0]).max()
 
@@ -524,7 +457,7 @@ def test_solution_with_fibres_is_saved(tmp_path):
     beam = ub.Beam((0, 0, 0), (1, 0, 0), square(4, 0.0, ub.ElastoPlastic(fy)), cells=2)
     load = ub.PointLoad(beam.end, force=(0, 1e6, 2e6), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.01), dt=1e-3, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.01), dt=1e-3)
     run.save(tmp_path / "run.npz")
     loaded = ub.Solution.load(tmp_path / "run.npz")
     (own,) = loaded.scene.beams
@@ -549,10 +482,8 @@ def test_stiffness_across_an_embedded_hinge(degrees):
     motor = ub.Turn(ub.ground(1, 0, 0), beam.end, turn, axis=(0, 0, 1))
     along = np.array([np.cos(Θ / 2), np.sin(Θ / 2), 0.0])
     twist = ub.PointLoad(beam.end, moment=tuple(1e-2 * along), amplitude=lambda t: float(t > 1.001))
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], connectors=[motor], loads=[twist]
-    )  # fmt: skip
-    run = ub.simulate(scene, ub.Static(), t=(0, 1.02), dt=0.02, newton=EXACT, progress=False)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[motor], loads=[twist])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1.02), dt=0.02, newton=EXACT)
     before, after = (Rotation.from_rotvec(x[3:]) for x in run.displacement(beam.end)[-2:])
     small = (after * before.inv()).as_rotvec()
     stiffness = 1e-2 / (small @ along)

@@ -12,19 +12,18 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from into_space import EXACT, SKEW, InSpace, same_in_space
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 from scipy.spatial.transform import Rotation
-from test_space import KINDS, OTHER, STIFF, TURNS, in_plane, in_space, same_motion
+from test_space import KINDS, OTHER, STIFF, in_plane
 
 import ufl_beam as ub
 import ufl_beam.structures as st
 from ufl_beam.output.history import MOTION
 
 SECTION = ub.Section(**STIFF, **OTHER)
-EXACT = ub.Newton(rtol=1e-13)
-RUN = {"newton": EXACT, "progress": False}
-SKEW = Rotation.from_rotvec([0.3, -0.7, 1.1])
+RUN = {"newton": EXACT}
 
 
 def skew(*vector):
@@ -65,15 +64,9 @@ def split(header):
 @pytest.mark.parametrize(("kind", "limit"), [("Stretch", 10.0), ("Slide", 5.0), ("Turn", 30.0)])
 def test_friction_is_the_same_in_space(kind, limit):
     """It sticks and slips as in the plane; Stretch and Slide also turn back."""
-    scenes = [
-        make(connectors=lambda *x: [KINDS[kind](*x, ub.Coulomb(limit))])
-        for make in (in_plane, lambda **more: in_space(TURNS[1], **more))
-    ]
-    runs = same_motion(*scenes, ub.EnergyMomentum(), TURNS[1])
-    one, other = (run.connector(run.scene.connectors[0]) for run in runs)
-    for name in ("motion", "force", "work"):
-        a, b = getattr(one, name), getattr(other, name)
-        assert np.abs(a - b).max() < 1e-9 * max(1.0, np.abs(a).max())
+    scene = in_plane(lambda *ends: [KINDS[kind](*ends, ub.Coulomb(limit))])
+    run = same_in_space(scene, ub.EnergyMomentum())[1]
+    other = run.connector(run.scene.connectors[0])
     slips = np.abs(np.abs(other.force[1:]) - limit) < 1e-9 * limit
     assert slips.any()
     assert not slips.all()
@@ -404,33 +397,6 @@ def test_section_forces_of_a_simple_beam():
     assert max(np.abs(x).max() for x in (found.N, found.T)) < 1e-4 * q * length
 
 
-def test_section_forces_are_those_of_the_plane():
-    """A planar frame in space, in a turned plane: at all points of statics."""
-    runs = []
-    for turn in (None, SKEW):
-        at = (lambda x, y: (x, y)) if turn is None else (lambda x, y: skew(x, y, 0))
-        section = ub.Section(**STIFF, **({} if turn is None else OTHER))
-        up = [{} if turn is None else {"up": at(*x)} for x in ((0, 1), (-1, 0))]
-        girder = ub.Beam(at(0, 0), at(2, 0.3), section, cells=3, **up[0])
-        post = ub.Beam(at(2, 0.3), at(2.2, 2), section, cells=2, **up[1])
-        loads = [
-            ub.LineLoad(girder, force=at(10, -40)),
-            ub.PointLoad(post.end, force=at(60, -30), amplitude=lambda t: t),
-        ]
-        scene = ub.Scene(
-            [girder, post], joints=[ub.Rigid(girder.end, post.start)],
-            supports=[ub.Clamped(girder.start)], loads=loads,
-        )  # fmt: skip
-        runs.append(ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, **RUN))
-    for one, other in zip(*(run.scene.beams for run in runs), strict=True):
-        plane, space = runs[0].diagram(one), runs[1].diagram(other)
-        size = max(np.abs(x).max() for x in plane[1:])
-        for a, b in zip(plane[1:], (space.N, space.V2, space.M3), strict=True):
-            assert np.abs(a - b).max() < 1e-4 * size
-            assert np.abs(a - b)[[0, -1]].max() < 1e-10 * size
-        assert max(np.abs(x).max() for x in (space.V3, space.T, space.M2)) < 1e-10 * size
-
-
 def test_extremes_are_those_of_the_stored_states():
     scene, extremes = machine(), ub.Extremes(points=3, accelerations=True)
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, record=extremes, **RUN)
@@ -455,7 +421,7 @@ TOWER = ub.Beam((0, 0, 0), (0, 0, 6), TUBE, up=(1, 0, 0), name="tower")
 BASE = ub.Clamped(TOWER.start)
 FREE = ub.Scene([TOWER], supports=[BASE])
 WIND = ub.LineLoad(TOWER, force=(300.0, 400.0, 0.0))
-STATIC = {"t": (0, 1), "dt": 1.0, "progress": False}
+STATIC = {"t": (0, 1), "dt": 1.0}
 
 
 def blown():
@@ -469,7 +435,7 @@ def fatigue():
     record = st.Fatigue(spot, st.SNCurve.eurocode(71e6))
     sway = ub.PointLoad(TOWER.end, force=(2e3, 1e3, 0), amplitude=lambda t: math.sin(t))
     scene = ub.Scene([TOWER], supports=[BASE], loads=[sway])
-    run = ub.simulate(scene, ub.Static(), t=(0, 20), dt=0.2, record=record, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 20), dt=0.2, record=record)
     forces = run.section_forces_at(TOWER.start)
     own = spot.stress(*forces.T)
     # Axis 2 is x, axis 3 is y: the foot has compression at x = 0.1 and tension at y = -0.05
@@ -487,7 +453,7 @@ def combinations():
     )}  # fmt: skip
     both = st.load_combinations(
         FREE, {name: [load] for name, load in push.items()},
-        {"A": {"x": 1.5}, "B": {"x": -1.0, "y": 1.0}}, progress=False,
+        {"A": {"x": 1.5}, "B": {"x": -1.0, "y": 1.0}},
     )  # fmt: skip
     found = both.section_forces(TOWER)
     M3, M2 = (found.high[0, 5], found.low[0, 5]), (found.high[0, 4], found.low[0, 4])
@@ -509,7 +475,7 @@ def drifts():
     assert found.drift[-1].sum() == pytest.approx(moved @ (0.6, 0.8), rel=1e-12)
     stays = [ub.Stretch(ub.ground(2, k, 0), TOWER.end, ub.Spring(1e5)) for k in (-1, 2)]
     stayed = ub.Scene([TOWER], supports=[BASE], loads=[WIND], connectors=stays)
-    run = ub.simulate(stayed, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(stayed, ub.Static(), t=(0, 1), dt=0.25)
     found = st.storeys(run, [TOWER.start, TOWER.at(0.5), TOWER.end], direction=(3, 4))
     assert np.abs(found.shear[-1] - [500.0 * 6, 500.0 * 3]).max() < 1e-5
     assert max(abs(run.connector(x).force[-1]) for x in stays) > 1e3
@@ -521,40 +487,30 @@ def drifts():
 FRAME_HINGE = ub.LinearSoftening(limit=100e3, fracture_energy=20e3)
 
 
-def portal(turn=None):
-    """A frame in the plane, or turned in space about z; weight on its girder."""
-
-    def at(x, y):
-        return (x, y) if turn is None else tuple(turn.apply((x, 0, y)))
-
-    def member(name, start, end, up, **hinges):
-        more = {} if turn is None else {"up": tuple(turn.apply(up))}
-        return ub.Beam(at(*start), at(*end), TUBE, cells=6, name=name, **more, **hinges)
-
+def portal():
+    """A frame in the plane; weight on its girder."""
     left, right = (
-        member(name, (x, 0), (x, 4), (-1, 0, 0), hinges={0: FRAME_HINGE})
+        ub.Beam((x, 0), (x, 4), TUBE, cells=6, name=name, hinges={0: FRAME_HINGE})
         for name, x in (("left", 0), ("right", 6))
     )
-    girder = member("girder", (0, 4), (6, 4), (0, 0, 1), hinges={0: FRAME_HINGE, 1: FRAME_HINGE})
+    both = {0: FRAME_HINGE, 1: FRAME_HINGE}
+    girder = ub.Beam((0, 4), (6, 4), TUBE, cells=6, name="girder", hinges=both)
     return ub.Scene(
         [left, right, girder],
         joints=[ub.Rigid(left.end, girder.start), ub.Rigid(right.end, girder.end)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
-        loads=[ub.LineLoad(girder, force=at(0, -5e3))],
+        loads=[ub.LineLoad(girder, force=(0, -5e3))],
     )
 
 
 @cache
 def capacities(pattern):
     """Capacity curves in the plane, and of the frame turned into the plane of y and z."""
-    turned = portal(Rotation.from_rotvec([0, 0, np.pi / 2]))
+    turned = InSpace(portal(), Rotation.from_matrix([[0, 0, 1], [1, 0, 0], [0, 1, 0]])).scene
     return [
-        st.pushover(
-            scene, scene["left"].end, 0.2, pattern=pattern, component=component, steps=50,
-            progress=False,
-        )
+        st.pushover(scene, scene["left"].end, 0.2, pattern=pattern, component=component, steps=50)
         for scene, component in ((portal(), "u"), (turned, "v"))
-    ]  # fmt: skip
+    ]
 
 
 def pushes():
@@ -596,7 +552,7 @@ def leaning():
     column = ub.Scene([TOWER], supports=[BASE], loads=[push])
     buckles = ub.buckling(column, 1)
     crooked = st.imperfect(column, mode=buckles, amplitude=0.01)
-    run = ub.simulate(crooked, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    run = ub.simulate(crooked, ub.Static(), t=(0, 1), dt=0.5)
     moved = np.linalg.norm(run.displacement(crooked["tower"].end)[-1, :2])
     assert moved == pytest.approx(0.01 / (buckles.factors[0] - 1), rel=1e-3)
     for words, more in (
@@ -611,8 +567,8 @@ def leaning():
 @pytest.mark.serial
 def test_start_with_a_hinge_at_a_joint():
     """Rotations of vertices that are in no cell, before hinges, begin with those of the run."""
-    first = portal(SKEW)
-    arguments = {"scheme": ub.Static(), "dt": 1.0, "progress": False}
+    first = InSpace(portal(), SKEW).scene
+    arguments = {"scheme": ub.Static(), "dt": 1.0}
     before = ub.simulate(first, t=(0, 1), **arguments)
     # Another scene of the same beams, so that loads and supports are set anew
     second = ub.Scene(
@@ -632,9 +588,8 @@ def incremental():
         return ub.Scene([TOWER], supports=[BASE], loads=[shaking])
 
     found = st.incremental_dynamic_analysis(
-        build, [pulse], [0.5, 1.0], limit=1.0, progress=False,
-        measure=lambda run: run.displacement(TOWER.end)[:, 0],
-    )  # fmt: skip
+        build, [pulse], [0.5, 1.0], limit=1.0, measure=lambda run: run.displacement(TOWER.end)[:, 0]
+    )
     assert found.demand[0, 1] == pytest.approx(2 * found.demand[0, 0], rel=1e-3)
 
 
@@ -658,37 +613,28 @@ def calibrated():
         dt=1.0,
         sigma=1e-9,
     )
-    fit = st.calibrate(model, {"E": 1.0}, [measured], progress=False)
+    fit = st.calibrate(model, {"E": 1.0}, [measured])
     assert fit.parameters["E"] == pytest.approx(0.7, rel=1e-5)
 
 
 def spectral():
     """Peaks of a bent frame are those of the plane, also about a loaded state."""
 
-    def arm(turn):
-        section = ub.Section(EA=1e8, GA=4e7, GA3=3e7, EI=2e6, EI2=1e6, GJ=1e6, rhoA=30.0, rhoI=0.0)
-
-        def at(x, y):
-            return (x, y) if turn is None else tuple(turn.apply((x, y, 0)))
-
-        def member(start, end, up):
-            more = {} if turn is None else {"up": tuple(turn.apply(up))}
-            return ub.Beam(at(*start), at(*end), section, cells=5, **more)
-
-        post, girder = member((0, 0), (0, 6), (-1, 0, 0)), member((0, 6), (3, 6), (0, 1, 0))
-        box = ub.Body(at(3, 6), mass=200.0)
-        return ub.Scene(
-            [post, girder], bodies=[box],
-            joints=[ub.Rigid(post.end, girder.start), ub.Rigid(girder.end, box.middle)],
-            supports=[ub.Clamped(post.start)],
-            loads=[ub.PointLoad(girder.end, force=at(0, -2e4))],
-        ), at(1, 0.3)  # fmt: skip
-
+    section = ub.Section(EA=1e8, GA=4e7, EI=2e6, rhoA=30.0, rhoI=0.0)
+    post = ub.Beam((0, 0), (0, 6), section, cells=5)
+    girder = ub.Beam((0, 6), (3, 6), section, cells=5)
+    box = ub.Body((3, 6), mass=200.0)
+    flat = ub.Scene(
+        [post, girder], bodies=[box],
+        joints=[ub.Rigid(post.end, girder.start), ub.Rigid(girder.end, box.middle)],
+        supports=[ub.Clamped(post.start)],
+        loads=[ub.PointLoad(girder.end, force=(0, -2e4))],
+    )  # fmt: skip
+    copy = InSpace(flat, SKEW)
     for loaded in (False, True):
         found = []
-        for turn in (None, SKEW):  # all modes
-            scene, direction = arm(turn)
-            state = {"at": ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)}
+        for scene, direction in (flat, (1, 0.3)), (copy.scene, copy.vector((1, 0.3))):  # all modes
+            state = {"at": ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)}
             found.append(st.response_spectrum_analysis(
                 scene, ([1e-9, 9.0], [3.0, 3.0]), n=200, direction=direction,
                 **(state if loaded else {}),
@@ -812,22 +758,11 @@ def test_a_joint_bears_what_is_beyond_it():
 
 
 def test_forces_of_joints_are_those_of_the_plane():
-    def pendulum(turn):
-        d = 2 if turn is None else 3
-
-        def point(x, y):
-            return (x, y) if turn is None else tuple(turn.apply((x, y, 0)))
-
-        inertia = 0.1 if turn is None else 0.1 * np.eye(3)
-        body = ub.Body(point(0.5, 0.2), mass=2.0, inertia=inertia)
-        axis = {} if turn is None else {"axis": tuple(turn.apply((0, 0, 1)))}
-        joint = ub.Revolute(ub.ground(*(0.0,) * d), body.at(*(0.0,) * d), **axis)
-        weight = ub.Gravity(point(0, -9.81))
-        scene = ub.Scene(bodies=[body], joints=[joint], loads=[weight])
-        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02, **RUN)
-        return run.joint(joint)
-
-    plane, space = pendulum(None), pendulum(SKEW)
+    body = ub.Body((0.5, 0.2), mass=2.0, inertia=0.1)
+    joint, weight = ub.Revolute(ub.ground(0, 0), body.at(0, 0)), ub.Gravity((0, -9.81))
+    scene = ub.Scene(bodies=[body], joints=[joint], loads=[weight])
+    runs = same_in_space(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.02)
+    plane, space = (run.joint(run.scene.joints[0]) for run in runs)
     for name in ("force", "in_a", "in_b"):
         back = SKEW.inv().apply(getattr(space, name))
         assert np.abs(back[:, :2] - getattr(plane, name)).max() < 1e-10
@@ -898,18 +833,11 @@ def test_other_pictures(tmp_path):
 def test_pictures_of_damage():
     """Yielded cells, hinges and their curves are those of the scene in the plane."""
     law, hinge = ub.ElastoPlastic(30.0, isotropic=50.0), ub.LinearSoftening(20.0, 40.0)
-    runs = []
-    for make in (lambda *x: x, lambda *x: skew(*x, 0)):
-        turned = len(make(1, 0)) == 3
-        more = {"up": skew(0, 1, 0)} if turned else {}
-        axes = {"along": skew(1, 0, 0), "up": skew(0, 0, 1)} if turned else {}
-        section = ub.Section(**STIFF, **OTHER, bending=law)
-        post = ub.Beam(
-            make(0, 0), make(1, 0), section, cells=4, hinges={0.5: hinge}, name="post", **more
-        )
-        pull = ub.PrescribedDisplacement(post.end, v=lambda t: 0.3 * math.sin(3 * t), **axes)
-        scene = ub.Scene([post], supports=[ub.Clamped(post.start), pull])
-        runs.append(ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, **RUN))
+    section = ub.Section(**STIFF, bending=law)
+    post = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.5: hinge}, name="post")
+    pull = ub.PrescribedDisplacement(post.end, v=lambda t: 0.3 * math.sin(3 * t))
+    scene = ub.Scene([post], supports=[ub.Clamped(post.start), pull])
+    runs = same_in_space(scene, ub.Static(), dt=0.05)
     marks = []
     for run in runs:
         (post,) = run.scene.beams

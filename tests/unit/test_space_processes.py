@@ -80,7 +80,7 @@ def compare(run, alone, same=SAME):
 
 def check(scene, scheme=None, *, t=(0, 0.4), dt=0.02, same=SAME, **more):
     """Compare a run on all processes with one of this process alone; return both."""
-    arguments = {"t": t, "dt": dt, "newton": EXACT, "progress": False, **more}
+    arguments = {"t": t, "dt": dt, "newton": EXACT, **more}
     scheme = scheme or ub.EnergyMomentum()
     run = ub.simulate(scene, scheme, **arguments)
     alone = ub.simulate(scene, scheme, **arguments, comm=MPI.COMM_SELF)
@@ -278,7 +278,7 @@ def test_a_path_with_a_critical_point():
     )  # fmt: skip
     paths = [
         ub.follow(
-            scene, ub.ArcLength(0.2), until=lambda now: now.t > 6, steps=60, progress=False,
+            scene, ub.ArcLength(0.2), until=lambda now: now.t > 6, steps=60,
             newton=ub.Newton(rtol=1e-11), comm=comm,
         )
         for comm in (COMM, MPI.COMM_SELF)
@@ -300,7 +300,7 @@ def test_recorders(shared_path, on_first_rank):
             ub.VTKHDF(shared_path / f"{name}.vtkhdf"),
         ]  # fmt: skip
 
-    arguments = {"t": (0, 0.4), "dt": 0.02, "newton": EXACT, "progress": False}
+    arguments = {"t": (0, 0.4), "dt": 0.02, "newton": EXACT}
     run = ub.simulate(scene, ub.EnergyMomentum(), record=(shared := recorded("all")), **arguments)
     by_one = recorded("one")
     on_first_rank(lambda: ub.simulate(
@@ -338,7 +338,7 @@ def test_processes_agree_on_errors():
 
     def words(scene, error, comm=COMM, **more):
         with pytest.raises(error) as raised:
-            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), progress=False, comm=comm, **more)
+            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), comm=comm, **more)
         return str(raised.value)
 
     steps = ub.Adaptive(1e-3, first=0.1, shortest=0.01)

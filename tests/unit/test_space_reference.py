@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from test_space import EXACT, KINDS, LAWS, OTHER, STIFF, TURNS, bend, crane, in_space
+from into_space import EXACT
+from test_space import KINDS, LAWS, OTHER, STIFF, bend, crane, in_space
 
 import ufl_beam as ub
 
@@ -13,7 +14,7 @@ PLAIN = ub.Newton(rtol=1e-12, reference=True)
 
 
 def spring(law):
-    return in_space(TURNS[1], connectors=lambda *ends: [KINDS["Slide"](*ends, LAWS[law])])
+    return in_space(connectors=lambda *ends: [KINDS["Slide"](*ends, LAWS[law])])
 
 
 def bent():
@@ -24,8 +25,8 @@ def bent():
 
 CASES = {
     "machine": (crane, ub.EnergyMomentum(), 0.2, 0.02),
-    "dissipation": (lambda: in_space(TURNS[1]), ub.EnergyMomentum(0.1, 0.05), 1.0, 0.1),
-    "decaying": (lambda: in_space(TURNS[1]), ub.EnergyMomentumDecaying(), 1.0, 0.1),
+    "dissipation": (in_space, ub.EnergyMomentum(0.1, 0.05), 1.0, 0.1),
+    "decaying": (in_space, ub.EnergyMomentumDecaying(), 1.0, 0.1),
     "stop": (lambda: spring("stop"), ub.EnergyMomentum(), 0.5, 0.1),
     "yielding spring": (lambda: spring("hardening spring"), ub.EnergyMomentum(), 0.5, 0.1),
     "statics": (bent, ub.Static(), 1.0, 0.25), "arc": (lambda: bend(8), ub.Static(), 1.0, 0.25),
@@ -38,8 +39,7 @@ def test_equal_motion(case):
     make, scheme, t, dt = CASES[case]
     scene = make()
     ordinary, plain = (
-        ub.simulate(scene, scheme, t=(0, t), dt=dt, newton=newton, progress=False)
-        for newton in (EXACT, PLAIN)
+        ub.simulate(scene, scheme, t=(0, t), dt=dt, newton=newton) for newton in (EXACT, PLAIN)
     )
     for place in [beam.at(0.6) for beam in scene.beams] + [x.middle for x in scene.bodies]:
         one, other = (run.displacement(place) for run in (ordinary, plain))
@@ -50,4 +50,4 @@ def test_equal_motion(case):
 def test_scope():
     scheme = ub.EnergyMomentum(order=4)
     with pytest.raises(ub.ArgumentError, match="cannot be combined with EnergyMomentum"):
-        ub.simulate(bent(), scheme, t=(0, 1), dt=0.5, newton=PLAIN, progress=False)
+        ub.simulate(bent(), scheme, t=(0, 1), dt=0.5, newton=PLAIN)

@@ -13,6 +13,7 @@ import pytest
 import ufl
 from helpers import raises, require_restart, run
 from scenes import clamped
+from user_classes import Stiffening
 from user_laws import AirDrag, HardeningSpring, MaxwellElement
 
 import ufl_beam as ub
@@ -25,17 +26,6 @@ SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
 EXACT, LOSSY, AT_END = ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1), ub.GeneralizedAlpha()
 
 run = partial(run, t=(0, 0.5), dt=0.025, newton=ub.Newton(rtol=1e-12))
-
-
-@dataclass(frozen=True)
-class Quartic(extend.ConnectorLaw):
-    """The same energy as a law of a connector."""
-
-    k: float
-    h: float
-
-    def energy(self, motion, state):
-        return self.k / 2 * motion**2 + self.h / 4 * motion**4
 
 
 SPRING = {"k": 300.0, "h": 500.0}
@@ -98,7 +88,7 @@ def test_a_spring_is_that_of_a_connector_law(scheme):
     ``alpha`` the scheme damps springs, but no laws of users.
     """
     numbers = SPRING | {"h": 0.0} if scheme.alpha else SPRING
-    law_of_connector = ub.Spring(numbers["k"]) if scheme.alpha else Quartic(**numbers)
+    law_of_connector = ub.Spring(numbers["k"]) if scheme.alpha else Stiffening(*numbers.values())
 
     def connector(beam, body):
         return ub.Slide(ub.ground(2, 1), body.middle, law_of_connector, axis=(0, 1))
@@ -249,7 +239,7 @@ def powers(k=3.0, power=1.5, kind=Power):
 @pytest.mark.serial
 def test_derivatives_by_numbers_in_a_statement():
     """Central differences: an error of 1e-8 by a relative step of 1e-4, and of Newton's method."""
-    options = {"t": (0, 0.5), "dt": 0.05, "newton": ub.Newton(rtol=1e-12), "progress": False}
+    options = {"t": (0, 0.5), "dt": 0.05, "newton": ub.Newton(rtol=1e-12)}
     at, scheme, step = {"k": 3.0, "power": 1.5}, ub.EnergyMomentum(), 1e-4
     found = ub.differentiate(powers, at, scheme, **options).of(lambda run: run.q[-1])
     for p, (name, value) in enumerate(at.items()):
@@ -262,7 +252,7 @@ def test_derivatives_by_numbers_in_a_statement():
         np.testing.assert_allclose(found[:, p], difference, rtol=0, atol=1e-6 * largest)
 
 
-SHORT = {"t": (0, 0.1), "dt": 0.05, "progress": False}
+SHORT = {"t": (0, 0.1), "dt": 0.05}
 
 
 @pytest.mark.serial

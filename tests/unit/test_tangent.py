@@ -248,12 +248,3 @@ def test_tangent_of_inelastic_scenes(kind, scheme):
         probe = Probe(inelastic_scene(kind), scheme, turn=1.0, seed=seed)
         # None of these states lies within 1e-5 of a corner of its laws
         require_derivative(probe, 1e-6)
-
-
-@pytest.mark.parametrize("scheme", [ub.GeneralizedAlpha(0.6), ub.EnergyMomentum()], ids=str)
-def test_tangent_of_a_guide(scheme):
-    """Forces at the end of a step or over it, on a curve whose parameter is no arc length."""
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    guide = ub.Guided(beam.end, lambda s: (1 + 2 * s, 0.4 * ufl.sin(3 * s)))
-    guided = ub.Scene([beam], joints=[guide], supports=[ub.Roller(beam.start)])
-    require_derivative(Probe(guided, scheme, turn=0.3))

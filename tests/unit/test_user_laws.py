@@ -2,12 +2,11 @@
 """Laws of one's own in scenes: closed forms, the ledger, saved states, refusals."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pytest
-from helpers import raises, require_restart, run
+from helpers import raises, run
 from scenes import clamped
 from uniaxial_points import Bars, C
 from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
@@ -123,14 +122,6 @@ def test_the_ledger_closes_in_both_paths(name, alpha, as_by_reference):
     assert run.energy.worst < 1e-9
     if name != "stiffening":
         assert run.energy.lost["plastic"][-1] > 1e-3 * run.energy.energy_transferred
-
-
-@pytest.mark.parametrize("name", ["bending, hinge", "fibres", "spring"])
-def test_a_run_goes_on(name, shared_path):
-    """By ``start`` and from a checkpoint: internal variables of any name are taken over."""
-    require_restart(
-        partial(run, dt=5e-3), SCENES[name](), (), ub.EnergyMomentum(), shared_path, 0.1
-    )
 
 
 def test_modes_are_those_of_elastic_unloading():

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ufl
-from helpers import raises, require_restart, run
+from helpers import raises, run
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
@@ -165,11 +165,6 @@ def test_a_number_may_have_any_name():
 
 
 # -- processes, checkpoints, files -------------------------------------------------------------
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1, 0.1), ub.Newmark()], ids=repr)
-def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
-    require_restart(run, flying(lambda t: 5 + t), (), scheme, shared_path, until=1)
 
 
 def test_a_continued_run():

@@ -119,7 +119,7 @@ SPECTRUM = [
 """In the place of a spectrum; a function is evaluated at the periods of modes, with a mesh."""
 OF_FIBRES = ub.Section.rectangle(1.0, 1.0, **STEEL, fibres=ub.Fibres(LAW, number=4))
 HEAVY = clamped(BEAM, masses=[ub.PointMass(BEAM.end, 1.0)])
-PUSH = ub.simulate(PUSHED, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+PUSH = ub.simulate(PUSHED, ub.Static(), t=(0, 1), dt=1.0)
 BENT = st.Measurement(
     [0.5, 1.0], [1.0, 2.0], lambda run: run.displacement(BEAM.end)[:, 0],
     scheme=ub.Static(), t=(0, 1), dt=0.5,
@@ -594,9 +594,7 @@ def test_a_function_that_returns_no_number_during_a_run_is_refused(owner, value)
     parts = parts if isinstance(parts, dict) else {"loads": parts}
     scene = ub.Scene([BEAM], **{"supports": [ub.Clamped(BEAM.start)]} | parts)
     with raises(owner, "must return a number"):
-        ub.simulate(
-            scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False, comm=MPI.COMM_SELF
-        )
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, comm=MPI.COMM_SELF)
 
 
 def test_numbers_of_numpy_are_numbers():

@@ -13,9 +13,7 @@ import ufl_beam.structures as st
 
 SECTION = ub.Section(EA=2.1e9, GA=6.7e8, EI=9e6, rhoA=78.5, rhoI=0.065)
 TRUTH = {"limit": 60e3, "energy": 6e3, "stiffness": 3e6}  # N m, J, N m/rad
-BOUNDS = {
-    "limit": (40e3, 30e3, 120e3), "energy": (10e3, 3e3, 12e3), "stiffness": (5e6, 1.5e6, 6e6),
-}  # fmt: skip
+BOUNDS = {"limit": (40e3, 30e3, 120e3), "energy": (10e3, 3e3, 12e3), "stiffness": (5e6, 1.5e6, 6e6)}
 NOISE = 0.02
 
 
@@ -54,7 +52,7 @@ def exact():
     found = {}
     for name, run in RUNS.items():
         scene = column(**TRUTH, pushed=name == "pushover")
-        solution = ub.simulate(scene, run["scheme"], t=run["t"], dt=run["dt"], progress=False)
+        solution = ub.simulate(scene, run["scheme"], t=run["t"], dt=run["dt"])
         times = np.linspace(*run["t"], 61)[1:]
         any_sigma = st.Measurement(times, 0 * times, **run)
         found[name] = times, any_sigma.computed(solution)
@@ -74,7 +72,7 @@ def measured(exact, seed, given=True):
 
 def test_each_test_identifies_its_parameters(exact):
     """The hinge stays closed in the free decay, which knows the stiffness only, but best."""
-    fit = st.calibrate(column, BOUNDS, measured(exact, 0), progress=False)
+    fit = st.calibrate(column, BOUNDS, measured(exact, 0))
     assert fit.identified_by == {
         "limit": "pushover", "energy": "pushover", "stiffness": "free decay"
     }  # fmt: skip
@@ -91,7 +89,7 @@ def test_each_test_identifies_its_parameters(exact):
 @pytest.mark.slow
 def test_random_starts_end_at_the_same_minimum(exact):
     """Bounds are factors of 2 to 4 apart; within them the free decay has no other minimum."""
-    fit = st.calibrate(column, BOUNDS, measured(exact, 0), starts=20, progress=False)
+    fit = st.calibrate(column, BOUNDS, measured(exact, 0), starts=20)
     least = np.nanmin(fit.end_costs)
     assert (np.abs(fit.end_costs - least) <= 1e-8 * least).sum() >= 18
 
@@ -103,7 +101,7 @@ def test_intervals_cover_the_truth_in_95_of_100_data_sets(exact, given):
     """The number is binomial with mean 95 and standard deviation 2.2."""
     covered = np.zeros(3)
     for seed in range(100):
-        fit = st.calibrate(column, TRUTH, measured(exact, seed, given), progress=False)
+        fit = st.calibrate(column, TRUTH, measured(exact, seed, given))
         ends = np.array([*fit.intervals.values()]).T
         true = np.array([*TRUTH.values()])
         covered += (ends[0] <= true) & (true <= ends[1])
@@ -127,12 +125,12 @@ def test_random_starts_with_a_hinge_in_a_beam_end_at_the_same_minimum():
 
     run = {"scheme": ub.EnergyMomentum(alpha=0.02), "t": (0, 0.6), "dt": 2e-3}
     true = {"limit": 60e3, "energy": 6e3, "EI": 9e6}
-    solution = ub.simulate(cantilever(**true), progress=False, **run)
+    solution = ub.simulate(cantilever(**true), **run)
     noise = np.random.default_rng(0).normal(size=len(solution))
     values = sway(solution) + 0.01 * np.abs(sway(solution)).max() * noise
     bounds = {name: (1.2 * p, 0.5 * p, 1.5 * p) for name, p in true.items()}
     data = [st.Measurement(solution.times, values, sway, **run)]
-    fit = st.calibrate(cantilever, bounds, data, starts=20, progress=False)
+    fit = st.calibrate(cantilever, bounds, data, starts=20)
     least = np.nanmin(fit.end_costs)
     assert (np.abs(fit.end_costs - least) <= 1e-8 * least).sum() >= 18
     for name, (low, high) in fit.intervals.items():

@@ -152,9 +152,7 @@ FAMILIES = {
     "flying beam": (flying, ub.EnergyMomentum(), {"t": (0, 5), "dt": 0.05}),
     "flying beam, damped": (flying, ub.EnergyMomentum(0.01, 0.01), {"t": (0, 5), "dt": 0.05}),
     "flying beam, Newmark": (flying, ub.Newmark(), {"t": (0, 2), "dt": 0.02}),
-    "flying beam, generalized alpha": (
-        flying, ub.GeneralizedAlpha(0.8), {"t": (0, 2), "dt": 0.02}
-    ),
+    "flying beam, generalized alpha": (flying, ub.GeneralizedAlpha(0.8), {"t": (0, 2), "dt": 0.02}),
     "flying beam, order 4": (flying, ub.EnergyMomentum(order=4), {"t": (0, 2), "dt": 0.1}),
     "yielding": (yielding, DAMPED, STEPS),
     "Perzyna": (viscous, DAMPED, STEPS),
@@ -175,7 +173,7 @@ FAMILIES = {
     "damping ratio": (yielding, DAMPED, {"t": (0, 1.2), "dt": 0.004}, decay_ratio, 1e-5),
     # G_f changes the largest force little, just after the hinge opens
     "limit load": (pulled, ub.Static(), {"t": (0, 1), "dt": 0.01}, limit_load, 1e-5),
-}  # fmt: skip
+}
 """Models, schemes and steps, and quantities and tolerances other than the motion to AGREE."""
 
 
@@ -201,7 +199,7 @@ def test_derivatives_by_all_parameters(name):
 def test_derivatives_far_from_the_origin():
     """They do not depend on the place of a scene; coordinates of 300 m have two digits less."""
     at, near, far = {"length": 2.1, "height": 0.2}, swinging, partial(swinging, x=300.1, y=-200.1)
-    options = {"newton": TIGHT, "progress": False, "t": (0, 1), "dt": 0.01}
+    options = {"newton": TIGHT, "t": (0, 1), "dt": 0.01}
     runs = (ub.differentiate(model, at, ub.EnergyMomentum(), **options) for model in (near, far))
     expected, found = (run.of(history) for run in runs)
     for p in range(2):
@@ -213,7 +211,7 @@ def test_tolerances_of_steps():
     at = {"limit": 60e3, "EI": 9e6}
 
     def derivatives(rtol):
-        options = {"newton": ub.Newton(rtol=rtol), "progress": False, **STEPS}
+        options = {"newton": ub.Newton(rtol=rtol), **STEPS}
         return ub.differentiate(yielding, at, DAMPED, **options).of(history)
 
     exact = derivatives(TIGHT.rtol)

@@ -57,7 +57,7 @@ def analysis(motions, intensities, build=None, measure=drift, limit=0.1, **optio
     """Analysis of the weak column, without a bar."""
     build = build or (lambda record: shaken(WEAK, record, ub.Gravity()))
     return st.incremental_dynamic_analysis(
-        build, motions, intensities, measure, limit=limit, progress=False, **options
+        build, motions, intensities, measure, limit=limit, **options
     )
 
 
@@ -92,7 +92,7 @@ def test_members_are_runs_of_the_scaled_motion():
     for k, peak in enumerate((2.0, 4.0)):
         scene = shaken(WEAK, record.scaled(peak=peak), ub.Gravity())
         steps = {"t": (0, record.duration), "dt": record.dt, "comm": MPI.COMM_SELF}
-        run = ub.simulate(scene, ub.EnergyMomentum(), progress=False, **steps)
+        run = ub.simulate(scene, ub.EnergyMomentum(), **steps)
         assert found.demand[0, k] == np.abs(drift(run)).max()
     assert found.labels == ("drift", "peak acceleration (m/s²)")
     assert found.outcome.tolist() == [[0, 0, 1]]

@@ -37,7 +37,7 @@ def by_hand(x, dead, live=0.0, wind=0.0):
 
 def test_the_envelope_of_a_cantilever():
     """[closed] Deflections are 1e-7 of the length, so forces agree to 1e-6 of the largest, 15."""
-    found = st.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    found = st.load_combinations(SCENE, CASES, COMBINATIONS)
     assert ([*found.solutions], found.failed) == ([*COMBINATIONS], {})
     names, reached = np.array([*COMBINATIONS]), found.section_forces(BEAM, points=3)
     for row, x in ((0, 0.0), (1, L / 4), (5, L)):  # two cells with three points each
@@ -62,11 +62,11 @@ def test_combinations_are_runs_of_the_scene():
     hinged = ub.Beam((0, 0), (L, 0), SECTION, hinges={0.0: ub.ElastoPlastic(1e5, isotropic=1e6)})
     cases = {"tip": [ub.PointLoad(hinged.end, force=(0, -6e4))]}
     scene, rows = clamped(hinged, loads=[ub.Gravity()]), {"half": {"tip": 0.5}, "all": {"tip": 1.0}}
-    found = st.load_combinations(scene, cases, rows, steps=5, progress=False)
+    found = st.load_combinations(scene, cases, rows, steps=5)
     for name, factor in (("half", 0.5), ("all", 1.0)):
         load = ub.PointLoad(hinged.end, (0, -6e4), amplitude=ub.Table((0, 1), (0, factor)))
         alone = replace(scene, loads=[ub.Gravity(), load])
-        same = run(alone, ub.Static(), dt=0.2, progress=False)
+        same = run(alone, ub.Static(), dt=0.2)
         np.testing.assert_allclose(found.solutions[name].q[-1], same.q[-1], rtol=1e-10, atol=1e-15)
     drop = found.envelope(lambda one: one.displacement(hinged.end)[-1, 1])
     assert (type(drop.low_by), drop.low_by) == (str, "all")
@@ -81,7 +81,7 @@ def test_loads_between_vertices_are_in_the_envelope(place):
         "q": [ub.LineLoad(BEAM, force=(0, -1.0), span=(0.0, 0.7))],
     }
     combinations = {"1": {"P": 1.0}, "2": {"q": 1.0}}
-    found = st.load_combinations(SCENE, cases, combinations, progress=False)
+    found = st.load_combinations(SCENE, cases, combinations)
     (s,) = {tuple(one.diagram(BEAM).s) for one in found.solutions.values()}
     arms = [np.maximum(end * L - np.array(s) * L, 0) for end in (place, 0.7)]
     moments = -2.0 * arms[0], -(arms[1] ** 2) / 2  # N m
@@ -97,12 +97,12 @@ def test_a_combination_without_equilibrium_is_named_and_left_out():
     scene, cases = clamped(weak), {"P": [ub.PointLoad(weak.end, force=(0, -1e5))]}
     rows = {"much": {"P": 1.0}, "little": {"P": 0.4}}
     with pytest.warns(ub.ModelWarning, match=r"much: no equilibrium beyond 0\.5"):
-        found = st.load_combinations(scene, cases, rows, progress=False)
+        found = st.load_combinations(scene, cases, rows)
     assert ([*found.solutions], [*found.failed]) == (["little"], ["much"])
     assert found.failed["much"].startswith("no equilibrium beyond 0.5")
     assert "\n  much: no equilibrium beyond 0.5" in str(found)
     with raises("much: no equilibrium", kind=ub.ConvergenceError):
-        st.load_combinations(scene, cases, {"much": {"P": 1.0}}, progress=False)
+        st.load_combinations(scene, cases, {"much": {"P": 1.0}})
 
 
 def test_mistakes_are_named():
@@ -110,7 +110,7 @@ def test_mistakes_are_named():
         st.load_combinations(SCENE, CASES, {"A": {"wnd": 1.0}})
     with raises("cases['spin']: forces of a RotatingFrame have no factor"):
         st.load_combinations(SCENE, {"spin": [ub.RotatingFrame(rate=1.0)]}, {"A": {"spin": 1.0}})
-    found = st.load_combinations(SCENE, CASES, COMBINATIONS, progress=False)
+    found = st.load_combinations(SCENE, CASES, COMBINATIONS)
     with raises("combination 'ULS 1' = None must be numbers"):
         found.envelope(lambda run: None)
 
@@ -149,7 +149,7 @@ def test_dampers_and_damping_bear_nothing():
     brake = ub.Stretch(BEAM.start, BEAM.end, ub.Damper(1e9))
     damped = replace(SCENE, connectors=[brake], damping=[ub.KelvinVoigt(retardation_time=9.0)])
     runs = [
-        st.load_combinations(scene, cases, combinations, progress=False).solutions["all"]
+        st.load_combinations(scene, cases, combinations).solutions["all"]
         for scene in (damped, SCENE)
     ]
     np.testing.assert_allclose(runs[0].reaction(CLAMPED)[-1], (-0.5, 2.0, L), rtol=1e-6)

@@ -46,7 +46,7 @@ def portal(weight=0.0, law=PLASTIC, loads=(), rhoA=0.0):
 
 def pushed(scene, target=0.1, steps=25, **options):
     place = scene["left"].end
-    return st.pushover(scene, place, target, steps=steps, mesh=CUBIC, progress=False, **options)
+    return st.pushover(scene, place, target, steps=steps, mesh=CUBIC, **options)
 
 
 @pytest.fixture(scope="module")
@@ -100,11 +100,11 @@ def test_participation_of_a_cantilever_with_distributed_mass():
     section = ub.Section(EA=1e10, GA=1e10, EI=EI, rhoA=100.0)
     column = ub.Beam((0, 0), (0, H), section, cells=2, name="column")
     scene = clamped(column)
-    curve = st.pushover(scene, column.end, 0.01, pattern="triangular", steps=2, progress=False)
+    curve = st.pushover(scene, column.end, 0.01, pattern="triangular", steps=2)
     assert curve.mass == pytest.approx(100 * H, rel=1e-12)
     assert curve.equivalent_mass == pytest.approx(50 * H, rel=1e-12)
     assert curve.gamma == pytest.approx(1.5, rel=1e-12)
-    modal = st.pushover(scene, column.end, 0.01, steps=2, progress=False, mesh=CUBIC)
+    modal = st.pushover(scene, column.end, 0.01, steps=2, mesh=CUBIC)
     assert modal.gamma == pytest.approx(1.5660, rel=1e-3)  # of a cantilever; EA, GA are finite
     assert modal.period == pytest.approx(2 * math.pi / 3.5160 * math.sqrt(100 * H**4 / EI), 1e-2)
 
@@ -198,7 +198,7 @@ def test_a_target_beyond_the_reach_is_reported_with_the_hinge():
     column = ub.Beam((0, 0), (0, H), section, cells=4, hinges={0.0: brittle}, name="column")
     scene = clamped(column, masses=[ub.PointMass(column.end, MASS)])
     with pytest.warns(ub.ModelWarning, match=r"ends at u = .* of 0.3 m.*column.start \(0, 0\)"):
-        curve = st.pushover(scene, column.end, 0.3, progress=False)
+        curve = st.pushover(scene, column.end, 0.3)
     # M_p h²/(3 EI) is the sway at the limit of the hinge; cells of h/4: (1/4)²/4 of it stiffer
     assert curve.displacement[-1] == pytest.approx(M_P * H**2 / (3 * EI), rel=0.02)
     assert "snap" not in str(curve.hinges)
@@ -218,7 +218,7 @@ def test_a_pattern_that_does_not_push_the_place_is_refused(options, words):
     scene = portal()
     place = getattr(scene["left"], options.pop("place", "end"))
     with pytest.raises(ub.ArgumentError, match=words):
-        st.pushover(scene, place, 0.1, progress=False, **options)
+        st.pushover(scene, place, 0.1, **options)
 
 
 def test_masses_and_periods_are_required(plain):
@@ -306,7 +306,7 @@ def test_springs_that_yield_or_break_are_in_the_sequence_of_hinges():
         beams, joints=tops, supports=[ub.Pinned(x) for x in starts], connectors=feet,
         masses=[ub.PointMass(beam.end, MASS) for beam in beams],
     )  # fmt: skip
-    result = st.pushover(scene, beams[0].end, 0.1, pattern="uniform", mesh=CUBIC, progress=False)
+    result = st.pushover(scene, beams[0].end, 0.1, pattern="uniform", mesh=CUBIC)
     assert [hinge.what for hinge in result.hinges] == ["yields", "yields", "opens"]
     first = {hinge.where: hinge.n for hinge in reversed(result.hinges)}
     assert first == {row.where: row.n for row in st.hinge_table(result.path).rows}
@@ -343,6 +343,6 @@ def test_a_mass_at_a_support_does_not_count():
     column = ub.Beam((0, 0), (0, 3), section)
     masses = [ub.PointMass(column.end, 5e3), ub.PointMass(column.start, 2e3)]
     scene = clamped(column, masses=masses)
-    curve = st.pushover(scene, column.end, 0.01, steps=2, progress=False)
+    curve = st.pushover(scene, column.end, 0.01, steps=2)
     assert curve.mass == pytest.approx(5e3)
     assert curve.gamma == pytest.approx(1.0)

@@ -160,7 +160,7 @@ def test_section_forces_of_a_mode_are_those_of_a_static_run(degree):
                 return float(response.modes.shape(0, beam.at(s))[axis].real)
 
             loads.append(ub.LineLoad(beam, **density, profile=along))
-    steps = {"t": (0, 1), "dt": 1.0, "mesh": mesh, "progress": False}
+    steps = {"t": (0, 1), "dt": 1.0, "mesh": mesh}
     run, foot = ub.simulate(replace(scene, loads=loads), ub.Static(), **steps), scene.supports[0]
     moved = np.abs(run.displacement(arm.end)[-1])
     np.testing.assert_allclose(response.displacement(arm.end), moved, rtol=1e-5)
@@ -196,7 +196,7 @@ def test_section_forces_about_a_state_are_in_equilibrium_with_reactions(state, d
     supports = [start, ub.Clamped(beam.end)]
     scene = ub.Scene([beam], supports=supports, loads=actions[state])
     mesh = ub.Mesh(degree=degree)
-    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, mesh=mesh, progress=False)
+    at = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05, mesh=mesh)
     with pytest.warns(ub.ModelWarning, match="of the mass"):
         response = st.response_spectrum_analysis(
             scene, lambda T: 1.0, n=1, direction=(0, 1), at=at, mesh=mesh
@@ -217,7 +217,7 @@ def test_a_loaded_state_softens_the_frame():
     weight = 1e4
     loads = [ub.PointLoad(SCENE[name].end, (0, -weight)) for name in ("left 1", "right 1")]
     loaded = replace(SCENE, loads=loads)
-    state = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC, progress=False)
+    state = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=1.0, mesh=CUBIC)
     response = st.response_spectrum_analysis(loaded, spectrum, n=2, at=state)
     k = STOREY - 2 * 1.2 * weight / H
     K = k * np.array([[2.0, -1.0], [-1.0, 1.0]])

@@ -18,13 +18,13 @@ def portal():
 def swing():
     """Dynamic run of beams with a mass."""
     scheme = ub.EnergyMomentum(0.01, 0.01)
-    return ub.simulate(scenes.swing(), scheme, t=(0, 0.1), dt=5e-3, progress=False)
+    return ub.simulate(scenes.swing(), scheme, t=(0, 0.1), dt=5e-3)
 
 
 @pytest.fixture(scope="session")
 def engine():
     """Dynamic run of bodies, joints and connectors without beams."""
-    return ub.simulate(crank(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.05, progress=False)
+    return ub.simulate(crank(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.05)
 
 
 @pytest.fixture(scope="session")
@@ -37,7 +37,7 @@ def extremes():
 def damaged(extremes):
     """Run of a cantilever whose cells yield and whose hinge opens, 150 steps of 0.02 s."""
     scheme = ub.EnergyMomentumStatic()
-    return ub.simulate(damaged_arm(), scheme, t=(0, 3), dt=0.02, record=extremes, progress=False)
+    return ub.simulate(damaged_arm(), scheme, t=(0, 3), dt=0.02, record=extremes)
 
 
 @pytest.fixture

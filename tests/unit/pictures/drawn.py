@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Models of the tests of pictures, and the lines, areas and texts of a figure."""
 
-from dataclasses import dataclass
-
 from mpi4py import MPI
 
 import numpy as np
 from matplotlib.colors import same_color
 from matplotlib.text import Text
+from user_classes import Stiffening
 
 import ufl_beam as ub
 
@@ -21,7 +20,7 @@ LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
 
 def static(scene, dt=1.0, **more):
     """Static run from t = 0 to 1."""
-    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, progress=False, **more)
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, **more)
 
 
 def moved(beam, **motion):
@@ -84,16 +83,6 @@ def storeys(bays, floors, law_of=lambda name: None):
     return ub.Scene(beams, joints=joined, supports=feet, loads=loads)
 
 
-@dataclass(frozen=True)
-class Quadratic(ub.extend.ConnectorLaw):
-    """A law of a user."""
-
-    k: float
-
-    def energy(self, motion, state):
-        return self.k * motion**2 / 2
-
-
 LAWS = [
     ub.PrescribedMotion(lambda t: 0.1 * t),
     ub.PrescribedForce(lambda t: t),
@@ -103,7 +92,7 @@ LAWS = [
     ub.Stop(100.0, high=0.05),
     ub.Coulomb(0.1),
     ub.ForceLaw(lambda x, v: 10.0 * x),
-    Quadratic(10.0),
+    Stiffening(10.0, 0.0),
     ub.RigidPlastic(ub.Softening(0.5, 1.0)),
 ]
 """A connector law of each kind."""

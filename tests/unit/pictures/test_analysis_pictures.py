@@ -22,7 +22,7 @@ def column(**more):
 def test_a_capacity_curve_shows_hinges_and_targets():
     beam = column(hinges={0.0: ub.ElastoPlastic(5e4, isotropic=1e5)})  # N m, N m/rad
     scene = clamped(beam, masses=[ub.PointMass(beam.end, 5e3)])
-    curve = st.pushover(scene, beam.end, -0.05, steps=10, progress=False)
+    curve = st.pushover(scene, beam.end, -0.05, steps=10)
     targets = curve.n2(lambda T: 8.0, 0.5), curve.asce41(lambda T: 8.0)
     figure = ub.plot(curve, targets=targets)
     axes = figure.axes[0]
@@ -53,7 +53,7 @@ def test_responses_and_combinations_have_both_signs():
     factors = {"left": {"W": 1.5}, "right": {"W": -1.5}}
     for found, words in (
         (st.response_spectrum_analysis(scene, lambda T: 3.0, n=6), "by response spectrum"),
-        (st.load_combinations(scene, cases, factors, progress=False), "of 2 load combinations"),
+        (st.load_combinations(scene, cases, factors), "of 2 load combinations"),
     ):
         figure = ub.plot(found, "V")
         assert len(outlines(figure, RED)) == len(outlines(figure, BLUE)) == 1
@@ -68,7 +68,7 @@ def test_a_study_is_drawn_over_each_number_that_its_cases_vary():
 
     cases = [(1.0, 5, "x"), (2.0, 7, "y"), (4.0, 6, "x")]
     cases = [{"a": a, "b": b, "name": name, "fixed": 1.0} for a, b, name in cases]
-    study = ub.study(member, cases, progress=False)
+    study = ub.study(member, cases)
     axes = np.reshape(ub.plot(study).axes, (2, 2))
     for panels, expected in zip(axes, ([15, 21, 18], [6, 9, 10]), strict=True):
         for panel, x in zip(panels, ([1, 2, 4], [5, 7, 6]), strict=True):
@@ -76,7 +76,7 @@ def test_a_study_is_drawn_over_each_number_that_its_cases_vary():
     assert [x.get_xlabel() for x in axes[1]] == ["a", "b"]
     assert [x.get_ylabel() for x in axes[:, 0]] == ["motion", "sum"]
     with raises("plot: the study has no results over numbers of its cases"):
-        ub.plot(ub.study(lambda name: {"x": 1.0}, [{"name": "x"}], progress=False))
+        ub.plot(ub.study(lambda name: {"x": 1.0}, [{"name": "x"}]))
 
 
 def test_demand_curves_end_at_collapse():

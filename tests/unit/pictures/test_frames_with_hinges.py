@@ -32,7 +32,7 @@ def path():
     """Path of the frame up to a sway of 0.5 m."""
     scene = frame(by_kind)
     control = ub.DisplacementControl(scene["C40"].end, "u", 0.025)
-    return ub.follow(scene, control, steps=20, progress=False)
+    return ub.follow(scene, control, steps=20)
 
 
 def words_of(figure):

@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 import scenes
-from drawn import LAWS, Quadratic, has, middles, outlines, static
+from drawn import LAWS, has, middles, outlines, static
 from helpers import PUBLIC, run
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.path import Path
+from user_classes import Stiffening
 
 import ufl_beam as ub
 from ufl_beam.plotting.style import INK, WHITE
@@ -187,7 +188,7 @@ def slider(connect, *laws):
 def test_all_public_connector_laws_are_drawn_below():
     public = {*PUBLIC.values()}
     laws = {x for x in public if getattr(x, "__module__", "").endswith(".connector_laws")}
-    assert {type(law) for law in LAWS} == laws - {ub.Clearance} | {ub.ForceLaw, Quadratic}
+    assert {type(law) for law in LAWS} == laws - {ub.Clearance} | {ub.ForceLaw, Stiffening}
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
