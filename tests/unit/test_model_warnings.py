@@ -336,6 +336,41 @@ def test_motions_that_jump_at_the_start():
 # -- sizes and numbers in other units --------------------------------------------------------------
 
 
+def test_tables_that_change_within_steps():
+    """[closed] The impulse of a pulse of 2 ms that ends before the middle of a step is lost."""
+    body = ub.Body((0, 0), mass=2.0, inertia=1.0)
+    pulse = ub.Table([0, 0.021, 0.022, 0.023], [0, 0, 1, 0])
+    push = ub.PointLoad(body.middle, force=(10.0, 0), amplitude=pulse)
+    scene = ub.Scene(bodies=[body], loads=[push])
+    coarse, fine = partial(ub.simulate, scene, ub.EnergyMomentum(), t=(0, 0.1)), 10.0 * 1e-3 / 2.0
+    with warns("PointLoad at body", "Table changes within steps of 0.01 s", "wrong by 100%"):
+        assert not coarse(dt=0.01).velocity(body.middle).any()
+    for dt in (1e-3, ub.Adaptive(1e-3)):
+        assert coarse(dt=dt).velocity(body.middle)[-1, 0] == pytest.approx(fine, rel=1e-9)
+
+    one = beam()
+    load = ub.PointLoad(one.end, force=(0, 1.0), amplitude=ub.Table([0, 0.5, 1], [0, 1, 0]))
+    cantilever = clamped(one, loads=[load])
+    with warns("PointLoad at girder.end", "within steps of 0.3333 s, so that 33% of it are missed"):
+        ub.simulate(cantilever, ub.Static(), t=(0, 1), dt=0.4)
+    ub.simulate(cantilever, ub.Static(), t=(0, 1), dt=0.25)
+
+
+@pytest.mark.parametrize("push", [0.0, 1.0])
+def test_an_unstable_equilibrium(push):
+    """[closed] A column of 100 N m² and 1 m, shortened by 2 %: EA bears 20 times Euler's load."""
+    column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=3e5, EI=1e2), cells=8)
+    down = ub.PrescribedDisplacement(column.end, u=0.0, v=lambda t: -0.02 * t)
+    load = ub.PointLoad(column.at(0.5), force=(push, 0))
+    scene = ub.Scene([column], supports=[ub.Pinned(column.start), down], loads=[load])
+    with warns("the equilibrium at t = 1 s is unstable", "negative eigenvalues", "imperfection"):
+        straight = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
+    assert straight.displacement(column.at(0.5))[-1, 0] <= 0.0  # against the push
+    if push:
+        bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.005)
+        assert bent.displacement(column.at(0.5))[-1, 0] > 0.08  # 2 L √(0.02)/π = 0.09
+
+
 @pytest.mark.parametrize("unit", [1.0, 1e3, 1e-3])
 def test_sections_in_millimetres(unit):
     """Whatever the unit of the scene is, a section is smaller than its beam is long."""

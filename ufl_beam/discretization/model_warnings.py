@@ -20,7 +20,7 @@ from ufl_beam.model import plausibility
 from ufl_beam.model.bodies import GROUND, BodyPoint, Place, moves_with_node
 from ufl_beam.model.connector_laws import RIGID, Clearance, PrescribedMotion
 from ufl_beam.model.connectors import place_of
-from ufl_beam.model.functions import value_at
+from ufl_beam.model.functions import Table, value_at
 from ufl_beam.model.joints import Release
 from ufl_beam.model.loads import Gravity, MovingLoad
 from ufl_beam.model.scene import Scene
@@ -32,6 +32,7 @@ TOUCHING = 1e-3
 JUMP = 1e-6
 """Largest initial jump without a warning: an angle in rad, or a fraction of the scene's size."""
 
+MISSED = 0.1  # largest fraction of a table that steps miss without a warning
 FAR_OUT = 10.0  # largest distance from the centre of a body without a warning, in radii of gyration
 
 
@@ -100,6 +101,41 @@ def warn_of_loads(scene: Scene, t: tuple[float, float]) -> None:
             warn(
                 f"{load}: its mass has no weight, because Gravity does not act on it; give "
                 "force=(0, -9.81 mass)"
+            )
+
+
+def warn_of_tables(scene: Scene, ends: Array, *, dynamic: bool) -> None:
+    """Warn of tables whose values change within steps with the given ends; s.
+
+    Dynamics takes loads in the middle of a step, so that the impulse of a short pulse may be lost.
+    Other values are taken at the ends of steps, which may leave out the extremes.
+    """
+    for owner, function in scene.time_functions():
+        if not isinstance(function, Table):
+            continue
+        times, values = (np.array(x, dtype=float) for x in (function.times, function.values))
+        of_impulse = dynamic and function is getattr(owner, "amplitude", None)
+        if of_impulse:
+            if np.diff(times).min(initial=math.inf) > 0.999 * (ends[1] - ends[0]):
+                continue  # a step has two of the times at most
+            areas = np.append(0.0, np.cumsum(np.diff(times) * (values[1:] + values[:-1]) / 2))
+            k = np.maximum(np.searchsorted(times, ends, "right") - 1, 0)
+            at_ends = np.interp(ends, times, values)
+            exact = np.diff(areas[k] + (ends - times[k]) * (values[k] + at_ends) / 2)
+            middles = np.interp((ends[1:] + ends[:-1]) / 2, times, values)
+            missed, whole = np.abs(exact - np.diff(ends) * middles).sum(), np.abs(exact).sum()
+        else:
+            taken = np.interp(ends, times, values)
+            every = np.append(taken, values[(times > ends[0]) & (times < ends[-1])])
+            whole = np.ptp(every)
+            missed = max(every.max() - taken.max(), taken.min() - every.min())
+        if missed > MISSED * whole:
+            error = f"{missed / max(whole, 1e-9 * missed):.0%}"
+            warn(
+                f"{owner}: its Table changes within steps of {ends[1] - ends[0]:.4g} s, so that "
+                + (f"impulses are wrong by {error}" if of_impulse else f"{error} of it are missed")
+                + ". Give a dt that divides the intervals between its times"
+                + (", or dt=Adaptive(...), whose steps end there" if dynamic else "")
             )
 
 

@@ -39,11 +39,11 @@ class PlainStep:
 
 
 STATIC_ADVICE = (
-    "Try a smaller dt. There is no equilibrium nearby beyond a limit load, or where softening "
-    "snaps back: limit**2/energy of a hinge, half of this if softening is linear, exceeds the "
-    "stiffness that drives the hinge. Then follow the path with ub.follow(scene, "
-    "ub.ArcLength(...)) or ub.DissipationControl(...), prescribe a displacement instead of the "
-    "load, or run dynamics"
+    "Try a smaller dt; constant loads act in the first step, give them amplitude=ub.ramp(...). "
+    "There is no equilibrium nearby beyond a limit load, or where softening snaps back: "
+    "limit**2/energy of a hinge, half of this if softening is linear, exceeds the stiffness that "
+    "drives the hinge. Then follow the path with ub.follow(scene, ub.ArcLength(...)) or "
+    "ub.DissipationControl(...), prescribe a displacement instead of the load, or run dynamics"
 )
 """Advice if a static step, in which time is the load factor, finds no equilibrium."""
 

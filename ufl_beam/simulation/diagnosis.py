@@ -10,7 +10,7 @@ from typing import NamedTuple
 from mpi4py import MPI
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, diags_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.cell_functions import strains_of
@@ -30,7 +30,7 @@ from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_
 from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
 from ufl_beam.model.connectors import place_of
 from ufl_beam.model.constraint_checks import INSTEAD
-from ufl_beam.model.loads import Rayleigh
+from ufl_beam.model.loads import Rayleigh, RotatingFrame
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
@@ -39,7 +39,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorization
 from ufl_beam.solvers.newton import Solver
-from ufl_beam.solvers.null_vectors import SINGULAR, soft_motions
+from ufl_beam.solvers.null_vectors import SINGULAR, free_tangent, soft_motions
 from ufl_beam.terms.term import KINDS
 
 LEAST_NAMED = 0.1
@@ -498,4 +498,41 @@ def warn_of_rayleigh(solution: Solution) -> None:
             f"rad, damping has taken {lost:.3g} J, and strains have stored at most {stored:.3g} J. "
             "Use KelvinVoigt(stiffness), with the same number, which damps strains only, or "
             "tangent=True if cells flow"
+        )
+
+
+EXAMINED = 20_000  # largest number of unknowns of a scene whose last static state is examined
+
+NEUTRAL = 1e-11  # eigenvalues down to minus this fraction of the diagonal count as zero
+
+
+def warn_of_instability(solution: Solution, equation: StepEquation, q: Array) -> None:
+    """Warn if the last state ``q`` of a static run is an unstable equilibrium, as of a column.
+
+    Scenes that have dissipated energy are not examined, nor those with forces of connectors, in a
+    rotating frame, with an unsymmetric tangent, or on several processes.
+    """
+    numbering = equation.subdomain.numbering
+    if (
+        len(numbering.multipliers) or numbering.size > EXAMINED or not equation.subdomain.alone
+        or any(lost[-1] for lost in solution.energy.lost.values())
+        or any(isinstance(load, RotatingFrame) for load in solution.scene.loads)
+    ):  # fmt: skip
+        return
+    if not equation.evaluate(q):  # the last step may have needed no tangent
+        return
+    K, free = free_tangent(equation)
+    if not len(free) or not np.isfinite(K.data).all():
+        return
+    try:
+        factors = Factorization(csr_array(K + diags_array(NEUTRAL * np.abs(K.diagonal()))))
+    except np.linalg.LinAlgError:
+        return
+    if factors.symmetric and factors.negative:
+        warn(
+            f"the equilibrium at {solution.parameter.at(float(solution.times[-1]), '.9g')} is "
+            f"unstable: its tangent stiffness has negative eigenvalues, {factors.negative} of "
+            f"{len(free)}, so that the scene would leave it, as a straight column beyond its "
+            "buckling load. An imperfection with shorter steps, or ub.follow, leads to stable "
+            "states"
         )

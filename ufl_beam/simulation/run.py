@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.discretization.model_warnings import warn_of_loads
+from ufl_beam.discretization.model_warnings import warn_of_loads, warn_of_tables
 from ufl_beam.errors import (
     ArgumentError,
     require_count,
@@ -37,7 +37,12 @@ from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.output.serialization import Description
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.simulation.checkpoint import Checkpoint, CheckpointFile, checksum_at
-from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch, warn_of_rayleigh
+from ufl_beam.simulation.diagnosis import (
+    LEDGER_TOLERANCE,
+    LedgerWatch,
+    warn_of_instability,
+    warn_of_rayleigh,
+)
 from ufl_beam.simulation.initial_state import StateOf, chosen_state, mesh_of, require_scheme
 from ufl_beam.simulation.reference_run import ReferenceInSpace, ReferenceRun
 from ufl_beam.simulation.simulation import Simulation
@@ -137,6 +142,9 @@ def simulate(
         )
     if isinstance(scene, Scene):
         warn_of_loads(scene, (t0, t1))
+        if not isinstance(dt, Adaptive):
+            ends = np.linspace(t0, t1, step_count(t1 - t0, dt) + 1)
+            warn_of_tables(scene, ends, dynamic=has_inertia(scheme))
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")
     start = chosen_state(start, "start")
@@ -193,6 +201,8 @@ def simulate(
             simulation, pace, recorders, bar, max_states=max_states, until=until, keeper=keeper,
             begin=begin,
         )  # fmt: skip
+        if not (by_reference or has_inertia(scheme)) and simulation.comm.rank == 0:
+            warn_of_instability(solution, simulation.equation, simulation.q)
     return solution
 
 

@@ -19,14 +19,10 @@ SINGULAR = 1e-12
 ROUNDS = 40  # largest number of scaling passes
 
 
-def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
-    """Find the motions that the latest tangent of a step equation resists least.
+def free_tangent(equation: Any) -> tuple[csc_array, Index]:
+    """Return the latest tangent of the degrees of freedom that no support holds, and their numbers.
 
-    All processes call it together.
-
-    Returns:
-        The tangent of the degrees of freedom that no support holds, their numbers in the scene, and
-        the results of :func:`null_vectors`; None if the tangent is empty or not finite.
+    All processes call it together.  The numbers are those in the scene.
     """
     subdomain, A, dofs = equation.subdomain, equation.A, equation.subdomain.dofs
     local = dofs[A.rows()], dofs[A.indices], A.data, dofs[equation.supports.dofs]
@@ -34,7 +30,19 @@ def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
     rows, columns, data, fixed = (np.concatenate(x) for x in zip(*gathered, strict=True))
     n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
-    K = csc_array(coo_array((data, (rows, columns)), shape=(n, n)).tocsc()[:, free][free])
+    return csc_array(coo_array((data, (rows, columns)), shape=(n, n)).tocsc()[:, free][free]), free
+
+
+def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
+    """Find the motions that the latest tangent of a step equation resists least.
+
+    All processes call it together.
+
+    Returns:
+        The results of :func:`free_tangent` and :func:`null_vectors`; None if the tangent is empty
+        or not finite.
+    """
+    K, free = free_tangent(equation)
     if not len(free) or not np.isfinite(K.data).all():
         return None
     try:
