@@ -148,7 +148,8 @@ class Simulation(Stepper):
         elif inertia is not None:
             together(equation.begin_energies, t0, q_local, inertia.v)
         if start is not None:
-            unknown = equation.set_internal_variables(q_local, t0, internal, same=same)
+            remembered = partial(equation.set_internal_variables, same=same)
+            unknown = together(remembered, q_local, t0, internal)
             together(require_known, numbering, start, unknown)
             together(self._require_held, equation, q_local)
         for term in equation.terms:
