@@ -9,11 +9,13 @@ import math
 import sys
 import time
 from pathlib import Path
+from unittest import mock
 
 from mpi4py import MPI
 
 import ufl_beam as ub
 from ufl_beam import parallel
+from ufl_beam.simulation.step_equation import StepEquation
 
 WORLD = MPI.COMM_WORLD
 ALL = -1
@@ -62,7 +64,7 @@ class Remembers:
 def failure(rank, make):
     """A function of anything that fails on a process, or on all."""
 
-    def fail(*_):
+    def fail(*_, **__):
         if rank in (ALL, WORLD.rank):
             raise make()
         return 0.0
@@ -155,12 +157,21 @@ def checkpoint(fail):
     run(scene(Remembers(state)), checkpoint=ub.Checkpoint(file, every=2))
 
 
+def internal_variables(fail):
+    """Those of another run, with which this run begins."""
+    first = run(scene())
+    with mock.patch.object(StepEquation, "set_internal_variables", side_effect=fail):
+        run(scene(), start=first)
+
+
 def path(fail):
     moves = ub.PrescribedDisplacement(BEAM.end, v=lambda t: fail() if t > 0.3 else 0.1 * t)
     ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.LoadControl(0.1))
 
 
-EVERYWHERE = [load, load_in_statics, gravity, controller, recorder, beginning, checkpoint]
+EVERYWHERE = [
+    load, load_in_statics, gravity, controller, recorder, beginning, checkpoint, internal_variables
+]  # fmt: skip
 """Cases whose function is called on all processes."""
 
 SOMEWHERE = [follower, prescribed, motor, actuator, function, work, events, path]

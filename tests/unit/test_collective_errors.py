@@ -27,7 +27,7 @@ def test_all_processes_raise_together(tmp_path):
     *lines, end = run.stdout.splitlines()
     assert end == "end"
     found = [line.split("|") for line in lines]
-    assert len(found) == 3 * 7 + 8 + 3 + 3
+    assert len(found) == 3 * 8 + 8 + 3 + 3
     for name, rank, outcomes in found:
         first, second = eval(outcomes)
         if name == "nan":

@@ -180,6 +180,23 @@ def test_runs_start_from_stored_states():
             assert np.abs(a - b).max() < 1e-10
 
 
+def test_runs_start_from_states_that_a_simulation_keeps():
+    """Without end(), and after later states than that of end()."""
+    scene = bent_arm()
+    for scheme in (ub.EnergyMomentum(), ub.Static()):
+        simulation = ub.Simulation(scene, scheme, newton=EXACT)
+        for t in (0.1, 0.3):
+            simulation.step_to(t)
+            simulation.keep()
+            follower = ub.Simulation(scene, scheme, t0=t, start=simulation.solution, newton=EXACT)
+            simulation.end()
+            follower.step_to(t + 0.1)
+            simulation.step_to(t + 0.1)
+            for beam in scene.beams:
+                a, b = (x.displacement(beam.end) for x in (simulation, follower))
+                assert np.abs(a - b).max() < 1e-10
+
+
 def test_pictures_and_files_of_modes(shared_path):
     shapes = ub.modes(strip(4)[0], 3)
     swing = shapes.motion(1, count=8)

@@ -296,7 +296,7 @@ def test_balance_of_hinges_about_several_axes():
 @pytest.mark.serial
 @pytest.mark.parametrize("kind", ["between nodes", "in a cell", "about two axes"])
 def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
-    """A cell is turned about axis 3 by a motor; between nodes to the series of the angle, 1e-9."""
+    """A cell is turned about axis 3 by a motor, to the derivative of the series of the angle."""
     law, stiff = (
         ub.LinearSoftening(8.0, fracture_energy=60.0),
         STIFF | OTHER | {"EA": 1e6, "GA": 1e6},
@@ -325,10 +325,109 @@ def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
         jump = run.connector(turns[0] if turns else run.scene.hinges[0]).motion
     moment = -run.connector(motor).force
     opened = slice(5, None)
-    assert np.allclose(moment[opened], law.traction(np.abs(jump[opened])), rtol=1e-9)
+    assert np.allclose(moment[opened], law.traction(np.abs(jump[opened])), rtol=1e-8)
     assert np.allclose(run.section_forces(beam)[0, 5], moment[-1], rtol=1e-7)
     area = 8.0 * np.abs(jump[-1]) - 8.0**2 / (4 * 60.0) * jump[-1] ** 2  # of the law, to the jump
     assert np.isclose(run.energy["hinges"][-1], area, rtol=1e-8)
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
+@pytest.mark.parametrize(
+    "law",
+    [
+        ub.Spring(0.1), ub.Coulomb(0.1), ub.PrescribedMotion(lambda t: 2 * t),
+        ub.RigidPlastic(ub.LinearSoftening(0.5, fracture_energy=10.0)),
+    ],
+    ids=lambda law: type(law).__name__,
+)  # fmt: skip
+def test_a_connector_of_a_revolute_joint_turns_as_often_as_in_the_plane(law, scheme):
+    """A body on a skew axis, up to eleven turns; a run in two parts is the same."""
+    static = isinstance(scheme, ub.Static)
+    if static and not isinstance(law, (ub.Spring, ub.PrescribedMotion)):
+        pytest.skip("a mechanism")
+    axis, found = (1.0, 2.0, 2.0), []
+    for at, turn in (((0, 0), {}), ((0, 0, 0), {"axis": axis})):
+        body = ub.Body(at, mass=1.0, inertia=(1.0, 1.0, 1.0) if turn else 1.0)
+        places = ub.ground(*at), body.middle
+        moment = tuple(np.array(axis) / 3) if turn else 1.0
+        push = ub.PointLoad(body.middle, moment=moment, amplitude=lambda t: t / 6)
+        motor = ub.Turn(*places, law, **turn)
+        scene = ub.Scene(
+            [], bodies=[body], joints=[ub.Revolute(*places, **turn)], connectors=[motor],
+            loads=[push],
+        )  # fmt: skip
+        arguments = {"dt": 0.1, "newton": EXACT, "progress": False}
+        run = ub.simulate(scene, scheme, t=(0, 12), **arguments)
+        found.append(run.connector(motor))
+        if not static:
+            half = ub.simulate(scene, scheme, t=(0, 6), **arguments)
+            rest = ub.simulate(scene, scheme, t=(6, 12), start=half, **arguments)
+            assert np.isclose(rest.connector(motor).motion[-1], found[-1].motion[-1], rtol=1e-9)
+            if turn:
+                with pytest.raises(ub.ArgumentError, match=r"Turn.* has internal variables"):
+                    ub.simulate(scene, scheme, t=(11, 12), start=(run, 110), **arguments)
+    plane, space = found
+    assert np.abs(plane.motion).max() > 3 * np.pi
+    assert np.allclose(space.motion, plane.motion, rtol=1e-9, atol=1e-9)
+    assert np.allclose(space.force, plane.force, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.serial
+@pytest.mark.filterwarnings("ignore:beam. the hinge:ufl_beam.ModelWarning")
+@pytest.mark.parametrize(
+    ("hinge", "sprung", "words"),
+    [
+        (True, False, "hinge in a cell, beam at .* by 3[56].°.* Beam.hinges="),
+        (False, False, "A cell, beam at .* is bent or twisted by 3[56].°.* more cells"),
+        (False, True, "places of Turn.ground.* have turned by 3[56].°.* other rotations"),
+    ],
+)
+def test_error_names_the_place_that_turns_by_360_degrees(hinge, sprung, words):
+    law = ub.LinearSoftening(8.0, fracture_energy=60.0) if hinge else None
+    section, ends = ub.Section(**STIFF | OTHER, hinge=law), {0.0: None, 1.0: None}
+    beam = ub.Beam((0, 0, 0), (1, 0, 0), section, cells=1, hinges=ends)
+    axis, ground = (0, -1, 0), ub.ground(1, 0, 0)
+    angle = {} if sprung else {"psi": lambda t: np.radians(410) * t}
+    drive = ub.PrescribedDisplacement(beam.end, axis=axis, **angle)
+    spring = ub.Turn(ground, beam.end, ub.Spring(1.0), axis=(1, -1, 0))
+    held = [ub.Clamped(beam.start)] * (not sprung)
+    push = ub.PointLoad(beam.end, moment=(0, -500.0, 0))
+    scene = ub.Scene(
+        [beam], supports=[drive, *held], connectors=[spring] * sprung, loads=[push] * sprung
+    )
+    with pytest.raises(ub.ConvergenceError, match=words):
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+
+
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
+@pytest.mark.parametrize("kind", ["support", "joint", "joint of beams"])
+def test_hinges_about_the_axis_of_a_support_or_joint_are_left_out(kind, scheme):
+    """Nothing bears a moment about it, as at a pin in the plane; a hinge of any limit may be there.
+
+    Also in a skew beam, in which round-off would be the stiffness of the node.
+    """
+    end, up = np.array([1.0, 2.0, 2.0]), (0.3, -1.0, 0.2)
+    section, weak = ub.Section(**STIFF | OTHER), ub.LinearSoftening(0.0, fracture_energy=1.0)
+    found = []
+    for hinges in ({}, {0.0: weak}):
+        beam = ub.Beam((0, 0, 0), tuple(end), section, cells=3, up=up, hinges=hinges)
+        other = ub.Beam((0, 0, 0), tuple(-end), section, cells=1, up=up)
+        axis, of_beams = tuple(2 * np.array(beam.third_axis(0.0))), kind == "joint of beams"
+        base = other.start if of_beams else ub.ground(0, 0, 0)
+        hinge = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=axis)
+        scene = ub.Scene(
+            [beam] + [other] * of_beams,
+            joints=[ub.Revolute(base, beam.start, axis=axis)] * (kind != "support"),
+            supports=[hinge] * (kind == "support") + [ub.Clamped(other.end)] * of_beams
+            + [ub.Pinned(beam.end)],
+            loads=[ub.PointLoad(beam.at(0.5), force=(1.0, 2.0, 3.0))],
+        )  # fmt: skip
+        assert not scene.hinges
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False)
+        found.append(run.displacement(beam.at(0.5)))
+    assert np.array_equal(*found)
+    tilted = ub.PrescribedDisplacement(beam.start, u=0, v=0, w=0, axis=tuple(end))
+    assert len(ub.Scene([beam], supports=[tilted, ub.Pinned(beam.end)]).hinges) == 1
 
 
 # -- fibres --------------------------------------------------------------------------------------

@@ -127,6 +127,40 @@ def test_a_free_hinge_turns_by_more_than_half_a_turn(steps):
     assert np.allclose(run.energy["loads"][-1], 9.0**2 / 2 * (1 / 2.0 + 1 / 10.0), rtol=1e-9)
 
 
+def test_forces_on_a_rope_that_stiffens_and_turns_its_end():
+    """[closed] A force on the middle of a straight rope, a moment on its end, and a weak spring.
+
+    Works do not tell that the steps follow the path; the forces at their ends remain those in axes
+    of the nodes: the moment on the end, which turns by 0.97 rad.  The force is that of an elastic
+    rope, but for the bending stiffness.
+    """
+    EA, EI, across = 1e3, 1e-2, (0, 0.6, 0.8)
+    section = ub.Section(EA=EA, GA=EA, GA3=EA, EI=EI, EI2=EI, GJ=EI)
+    rope = ub.Beam((0, 0, 0), (2, 0, 0), section, cells=2)
+    middle, moment, k = rope.at(0.5), np.array([2e-3, 3e-3, -4e-3]), 0.01
+
+    def force(t):
+        sag = 0.2 * t
+        return 2 * EA * (1 - 1 / np.hypot(1, sag)) * sag + k * sag
+
+    scene = ub.Scene(
+        [rope], supports=[ub.Clamped(rope.start), ub.Pinned(rope.end)],
+        connectors=[ub.Slide(ub.ground(1, 0, 0), middle, ub.Spring(k), axis=across)],
+        loads=[ub.PointLoad(middle, force=across, amplitude=force),
+               ub.PointLoad(rope.end, moment=tuple(moment), amplitude=lambda t: t)],
+    )  # fmt: skip
+    simulation = ub.Simulation(scene, ub.Static(), newton=ub.Newton(rtol=1e-13))
+    for t in (0.1, 0.2, 0.5, 0.9, 1.0):
+        simulation.step_to(t)
+        end = simulation.displacement(rope.end)[3:]
+        rotations = simulation.numbering.node(rope.end)[3:]
+        found = simulation._path.force[rotations]
+        assert np.allclose(found, Rotation.from_rotvec(end).inv().apply(t * moment), atol=1e-12)
+    assert simulation.substeps <= 6
+    assert np.linalg.norm(end) > 0.9
+    assert np.allclose(simulation.displacement(middle)[:3], 0.2 * np.array(across), atol=1e-3)
+
+
 def test_a_pendulum_away_from_its_equilibrium_is_refused():
     """As in the plane, with finite forces in the message."""
     section = ub.Section(**{name: 1e3 * x for name, x in (STIFF | OTHER).items()})

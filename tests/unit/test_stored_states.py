@@ -92,6 +92,13 @@ def test_states_without_their_internal_variables_are_refused(section, law, named
     with raises("start", named, "has internal variables", "end a run at t = 0.1 s", "snapshot()"):
         ub.simulate(scene, ub.EnergyMomentum(), t=(0.1, 0.2), dt=0.1, start=(run, 1))
     ub.simulate(scene, ub.EnergyMomentum(), t=(0.2, 0.3), dt=0.1, start=(run, 2))
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
+    simulation.step_to(0.1)
+    simulation.keep()
+    with raises("start", named, "has internal variables", "end of a run", "end()"):
+        ub.Simulation(scene, ub.EnergyMomentum(), start=simulation.solution)
+    simulation.end()
+    ub.Simulation(scene, ub.EnergyMomentum(), start=simulation.solution)
 
 
 def test_wrong_states(whole):

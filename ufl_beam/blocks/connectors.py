@@ -33,7 +33,7 @@ from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.state_io import NOWHERE, Archive
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
-from ufl_beam.mechanics.spatial_kinematics import Turn
+from ufl_beam.mechanics.spatial_kinematics import Turn, beyond
 from ufl_beam.mechanics.spatial_motions import SPATIAL_MOTIONS, GeometryInSpace, NodeInStep
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -149,10 +149,11 @@ class OnConnector(Statement):
     def state(self) -> list[str]:
         """Forces at the end of the last step, if they are in the work of a step; variables.
 
-        In space the quaternions of both nodes follow.
+        In space the double turns of rotations and the quaternions of both nodes follow.
         """
         before = bool(self.scheme.weight_of_before)
-        turns = [x for k in range(2 * self.in_space) for x in quaternion_names(k)]
+        turns = [f"turns {k}" for k, x in enumerate(self.motions) if x == "turning in space"]
+        turns += [x for k in range(2 * self.in_space) for x in quaternion_names(k)]
         return [*(f"force {k}" for k in range(before * self.laws)), *self.data.variables, *turns]
 
     @property
@@ -231,16 +232,19 @@ class OnConnector(Statement):
             )
             for k, x in enumerate((a, b) if self.rates else ())
         ]  # fmt: skip
-        found = list[tuple[Expr, ...]]()
+        found, state = list[tuple[Expr, ...]](), new_state(turns)
         for k, motion in enumerate(self.motions):
             given = np.reshape([at[f"{name} {k}"] for name in PLACES_IN_SPACE], (-1, 3))
             geometry = GeometryInSpace(*map(tuple, given.tolist()))
             moved = [*SPATIAL_MOTIONS[motion](a, b, geometry, self.scheme)]
+            if motion == "turning in space":  # quaternions return after two turns
+                state[f"turns {k}"] = at[f"turns {k}"] + beyond(moved[1], 2 * math.pi)
+                moved[:2] = (x + 4 * math.pi * at[f"turns {k}"] for x in moved[:2])
             if at_rest:
                 begun = at_rest[0], at_rest[1], geometry, self.scheme
                 moved.append(SPATIAL_MOTIONS[motion](*begun)[2])
             found.append(tuple(moved))
-        return found, new_state(turns)
+        return found, state
 
 
 def _same(x: Expr) -> Expr:

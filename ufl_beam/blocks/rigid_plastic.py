@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -84,31 +84,24 @@ class Hinged(OnConnector):
 
     Attributes:
         prototype: Law with other parameters.
-        freed: Whether exhausted connectors move freely, and others are held.
     """
 
     prototype: SofteningLaw | ElastoPlastic
-    freed: bool = False
     of_step = ("dt",)
     modes = ("direction",)  # of slip, or 0
-
-    @property
-    def frozen(self) -> Hinged:
-        """See the base class."""
-        return replace(self, freed=not isinstance(self.prototype, ElastoPlastic))
 
     @property
     def data(self) -> Data:
         """See the base class."""
         state = "slipped", "start", "limit", "back force", "last direction"
         recorded = {"dissipated": lib.RECORDED_TOTAL, "nodal": lib.RECORDED_STATE}
-        numbers = ["r", *parameters(self.prototype)]
+        numbers = ["r", "strength", *parameters(self.prototype)]
         return Data(numbers, dict.fromkeys(state, 0.0), recorded, opens=True)
 
     def values(self, connector: Any, setting: BlockSetting) -> tuple[Sequence[float], Any]:
         """See the base class."""
         law = law_of(connector)
-        return [_slope(connector, setting.scene.size), *parameters(law).values()], None
+        return [_slope(connector, setting.scene.size), 1.0, *parameters(law).values()], None
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class."""
@@ -145,8 +138,7 @@ class Hinged(OnConnector):
         way = at["direction"]
         slip = at.stage(positive(way * motion), way * motion)
         now = stepped(slip, way)
-        factor = FREED_STIFFNESS if self.freed else 1.0
-        force = factor * ufl.as_ufl(now.force)
+        force = at["strength"] * now.force
         slope = at.stage(abs(ufl.diff(force, slip)), 0.0)
         stiffened = ufl.conditional(ufl.gt(at["stiffened"], 0.0), slope * e1, force)
         held = ufl.eq(way, 0.0)
@@ -186,6 +178,8 @@ class HingeBlock(ConnectorBlock):
         names = "number yield_limit", "number limit"
         (at,) = (statement.numbers.index(x) for x in names if x in statement.numbers)
         self._initial_limit = self._numbers[:, at].copy()
+        hardens = isinstance(statement.prototype, ElastoPlastic)
+        self._frozen_strength = 1.0 if hardens else FREED_STIFFNESS
         self.state["limit"][:] = self._initial_limit
 
     @property
@@ -234,4 +228,5 @@ class HingeBlock(ConnectorBlock):
         """Hold connectors from now on; connectors with exhausted limits move freely."""
         spent = self.state["limit"] <= EXHAUSTED * self._initial_limit
         self.state["limit"][:] = np.where(spent, 0.0, FAR)
+        self.input("strength")[:] = self._frozen_strength
         super().freeze()

@@ -113,9 +113,9 @@ FLIPPED = 32
 """Added to a conformal rotation vector where the quaternion has the other sign, see newton.c."""
 
 
-def _flips(x: Any) -> Any:
-    """Return 1, -1 or 0: whether :data:`FLIPPED` is added to a number, or subtracted from it."""
-    some = [ufl.conditional(ufl.gt(way * x, FLIPPED / 2), 1.0, 0.0) for way in (1, -1)]
+def beyond(x: Any, limit: float) -> Any:
+    """Return 1 for numbers above the limit, -1 for numbers below -limit, else 0."""
+    some = [ufl.conditional(ufl.gt(way * x, limit), 1.0, 0.0) for way in (1, -1)]
     return some[0] - some[1]
 
 
@@ -135,7 +135,7 @@ class Turn:
     ) -> None:
         self.m, self.q0, self.frame = m, q0, matrix(q0)
         if at_end:
-            flips = _flips(m[0])
+            flips = beyond(m[0], FLIPPED / 2)
             p = scale(0.25, (m[0] - FLIPPED * flips, *m[1:]))
             c = stage((1 - 2 * abs(flips)) / (1 + dot(p, p)))
             q1 = product(q0, (c * (1 - dot(p, p)), *scale(2 * c, p)))
@@ -205,6 +205,15 @@ def _divided(y0: Expr, y1: Expr) -> tuple[Any, Any, Any]:
     return a, b, slope
 
 
+def below_a_turn(turns: Sequence[Turn]) -> Expr:
+    """Return 1, or NaN in a step through 360° between two nodes, where rotation vectors leap.
+
+    The sum of the quaternions is zero there, and has the opposite direction afterwards.
+    """
+    before, after = (add(*(getattr(x, q) for x in turns)) for q in ("q0", "q1"))
+    return ufl.sqrt(ufl.conditional(ufl.lt(dot(before, after), 0.0), -1.0, 1.0))
+
+
 def forces_over_step(
     stage: Callable[[Any], Any], turns: Sequence[Turn], ends: tuple[Middle, Middle],
     tangents: Sequence[Vector], length: Expr, resultants: Sequence[Sequence[Any]],
@@ -235,7 +244,7 @@ def forces_over_step(
     # Means of the quaternions over the step
     q1, q2 = stages(mean(A.q0, A.q1)), stages(mean(B.q0, B.q1))
     y = stages(product(q2, conjugate(q1)))
-    over = stage(1 / dot(add(A.q0, B.q0), add(A.q1, B.q1)))
+    over = stage(below_a_turn(turns) / dot(add(A.q0, B.q0), add(A.q1, B.q1)))
     # Factors of the virtual rotation in the virtual rotation vector
     P0, P1, Q = _divided(old.y, now.y)
     o0, o1 = 1 / (old.κ * old.λ), stage(1 / (now.κ * now.λ))

@@ -10,6 +10,8 @@ variations by means of both ends are exact increments.
 
 from __future__ import annotations
 
+import math
+from copy import copy
 from typing import NamedTuple
 
 import ufl
@@ -20,14 +22,22 @@ from ufl_beam.mechanics.spatial_kinematics import (
     Turn,
     Vector,
     add,
+    below_a_turn,
+    beyond,
+    conjugate,
     cross,
     dot,
     forces_over_step,
+    product,
+    scale,
     subtract,
     times,
     turned,
 )
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end
+
+ABOUT_AXIS = 1e-6
+"""Sine of half the rotation across an axis up to which b turns about this axis."""
 
 
 class GeometryInSpace(NamedTuple):
@@ -146,10 +156,22 @@ def aligning_in_space(
 def turning_in_space(
     a: NodeInStep, b: NodeInStep, n: GeometryInSpace, scheme: Scheme
 ) -> tuple[Expr, Expr, Expr]:
-    """Return the component along an axis, fixed in a and b, of the rotation vector of b; rad."""
-    turns, zero = (a.turn, b.turn), (0.0, 0.0, 0.0)
+    """Return the component along an axis, fixed in a and b, of the rotation vector of b; rad.
+
+    Beyond half a turn about the axis itself, b is given the quaternion of the other sign, whose
+    rotation vector is a turn shorter; so the formulas have no singularity at a turn.
+    """
+    turns, zero = (a.turn, copy(b.turn)), (0.0, 0.0, 0.0)
+    r = product(conjugate(a.turn.q0), b.turn.q0)
+    along = dot(n.axis, r[1:])
+    across = dot(r[1:], r[1:]) - along**2
+    about_axis = ufl.conditional(ufl.lt(across, ABOUT_AXIS**2), beyond(along, 0.0), 0.0)
+    turn = ufl.conditional(ufl.lt(r[0], 0.0), about_axis, 0.0)
+    for q in ("q0", "q1"):
+        setattr(turns[1], q, scale(1 - 2 * abs(turn), getattr(b.turn, q)))
     old, now = (Middle(_same, *(getattr(x, q) for x in turns)) for q in ("q0", "q1"))
-    values = [dot(n.axis, middle.rotation_vector) for middle in (old, now)]
+    values = [dot(n.axis, x.rotation_vector) + 2 * math.pi * turn for x in (old, now)]
+    values[1] *= below_a_turn(turns)
     some = turns
     if acts_at_end(scheme):
         old, some = now, (turns[0].at_end, turns[1].at_end)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import sys
 from abc import ABC
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
@@ -174,7 +175,8 @@ class Turn(Connector):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     In space, the motion is the component of the rotation vector along an ``axis`` that is fixed in
-    both places, below 360 degrees.
+    both places.  Rotations about the axis are not limited; others are below 360 degrees, and a step
+    beyond fails.
 
     Example:
         >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad
@@ -405,7 +407,8 @@ def require_apart(connector: Connector) -> None:
 def plastic_hinges(
     may_have: Mapping[Place, HingeLaw],  # laws of all possible hinges of beams
     rigid: Iterable[Sequence[NodeDof]],  # groups of rotations that joints make equal
-    bearing: Iterable[AttachmentPoint],  # places where supports, connectors or masses bear a moment
+    bearing: Iterable[tuple[AttachmentPoint, Any]],  # where supports, connectors or masses bear
+    # moments, with the axis about which they bear none, or None
     loaded: Iterable[AttachmentPoint],  # places of loads with a moment
 ) -> tuple[Connector, ...]:
     """Return plastic hinges of zero length as connectors, whose motions are jumps of rotation.
@@ -417,7 +420,8 @@ def plastic_hinges(
     of the stronger beam is left out if the moment of the weaker hinge never exceeds its limit.
 
     In space a hinge is about axis 3 of the section, and connectors before the hinges hold the other
-    rotations.  No hinge is left out for a weaker one, whose axis may be another one.
+    rotations.  It is left out at an end without a moment about this axis, but not for a weaker one,
+    whose axis may be another one.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:
@@ -427,22 +431,27 @@ def plastic_hinges(
     for dof in {*same, *same.values()}:
         members.setdefault(same[dof], []).append(dof[0])
 
-    borne, acted = ({same[node(place), 2] for place in places} for places in (bearing, loaded))
+    acted, borne = {same[node(place), 2] for place in loaded}, defaultdict[NodeDof, list[Any]](list)
+    for at, free in bearing:
+        borne[same[node(at), 2]].append(free)
 
-    def stays(place: Place) -> bool:
+    def stays(place: Place, axis: Point) -> bool:
         if 0.0 < place.s < 1.0:
             return True
         dof = same[place, 2]
         others = [x for x in members.get(dof, ()) if x != place]
         between = len(others) > 0 and (dof in acted or not _never_opens(place, others, laws))
-        return dof in borne or between
+        return between or any(
+            free is None or np.hypot.reduce(np.cross(free, axis)) > 1e-12 * math.hypot(*free)
+            for free in borne[dof]
+        )
 
     hinges, holders = list[Connector](), list[Connector]()
     for place, law in laws.items():
-        if stays(place):
+        axis = Component.axis if len(place.point) == 2 else place.beam.third_axis(place.s)
+        if stays(place, axis):
             beyond = Place(place.beam, place.s, beyond=True)
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-            axis = Component.axis if len(place.point) == 2 else place.beam.third_axis(place.s)
             hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law), axis))
             normals: Sequence[Point] = across(axis) if len(axis) == 3 else ()
             holders += [

@@ -252,12 +252,15 @@ class Scene(Record, Rich):
         connectors += [push for x in self.loads if isinstance(x, PointLoad) for push in x.pushes]
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         d = 3 if self.in_space else 2
-        bearing = [support.place for support in self.supports if support.bears_moment]
-        bearing += [mass.place for mass in self.masses if mass.inertia]
+        bearing: list[tuple[AttachmentPoint, Any]] = [
+            (x.place, None if 5 in x.held else x.axis) for x in self.supports if x.bears_moment
+        ]
+        bearing += [(mass.place, None) for mass in self.masses if mass.inertia]
         for connector in connectors if laws else ():
-            by_a, by_b = connector.rigidly()
-            bearing += [connector.a] * bool(any(by_a[d:]) or connector.follows_a)
-            bearing += [connector.b] * any(by_b[d:])
+            (by_a, by_b), is_revolute = connector.rigidly(), connector.kind == "Revolute"
+            free = connector.other if is_revolute and connector.is_rotation else None
+            bearing += [(connector.a, free)] * bool(any(by_a[d:]) or connector.follows_a)
+            bearing += [(connector.b, free)] * any(by_b[d:])
         loaded = [load.place for load in self.moments]
         rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
         return (*connectors, *plastic_hinges(laws, rigid, bearing, loaded))

@@ -14,6 +14,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.cell_functions import strains_of
+from ufl_beam.discretization.cells_in_space import by_rotation, rotations_between
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -25,6 +26,7 @@ from ufl_beam.errors import (
     StepFailed,
     warn,
 )
+from ufl_beam.mechanics.spatial_motions import ABOUT_AXIS
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
 from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
@@ -33,7 +35,7 @@ from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.loads import Rayleigh, RotatingFrame
 from ufl_beam.model.material_law import MaterialLaw, dissipation_must_grow, has_quadratic_energies
 from ufl_beam.model.material_laws import ElastoPlastic
-from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
+from ufl_beam.output.state_rows import DISSIPATED, HINGE, JUMP, PLASTIC, WORK
 from ufl_beam.output.states import States
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
@@ -70,6 +72,9 @@ step, the smallest substep, gives 1/64; a tenth allows for larger distances."""
 
 LEDGER_TOLERANCE = 10.0
 """Largest relative imbalance of a ledger that should be exact, as a multiple of ``Newton.rtol``."""
+
+BENT_FAR, NEAR_FULL_TURN = np.pi / 2, 1.9 * np.pi
+"""Rotations in space from which on an error of a run names a cell, or a connector; rad."""
 
 NAMED = 3  # largest number of names that a message lists
 
@@ -136,6 +141,40 @@ def no_equilibrium(
         dt=end - t, solution=solution, residuals=failure.residuals, forces=forces,
         reason=failure.reason,
     )  # fmt: skip
+
+
+def turned_far(now: States) -> str:
+    """Return advice on a hinge, cell or connector in space that has turned too far, or nothing."""
+    numbering, turns = now.numbering, now.turns(0)
+    at_dofs, cells = by_rotation(numbering, turns), numbering.cells
+    for connector in (x for x in now.scene.all_connectors if x.motion == "turning"):
+        ends = (at_dofs[[numbering.node(place)[3]]] for place in (connector.a, connector.b))
+        vector = rotations_between(*ends)[0]
+        is_about_axis = np.hypot.reduce(np.cross(vector, connector.axis)) < BENT_FAR * ABOUT_AXIS
+        if not is_about_axis and (angle := np.hypot.reduce(vector)) > NEAR_FULL_TURN:
+            return (
+                f"The places of {connector} have turned by {np.degrees(angle):.0f}°, and not only "
+                "about its axis, so that it measures rotations below 360°; let joints or supports "
+                "hold the other rotations"
+            )
+    first, second = turns[cells.T]
+    angles = np.linalg.norm(rotations_between(first, second), axis=1)
+    if max(angles, default=0.0) < BENT_FAR:
+        return ""
+    largest = int(angles.argmax())
+    angle, jump = angles[largest], abs(now.cells_of(0)[largest, JUMP])
+    cell = numbering.describe_cell(largest)
+    if jump > angle / 2:
+        return (
+            f"The hinge in a cell, {cell}, has turned by {np.degrees(jump):.0f}°; a cell is too "
+            "stiff about other axes beyond 90°, and cannot turn by 360°. Put the hinge between two "
+            "nodes, Beam(hinges={s: law})"
+        )
+    return (
+        f"A cell, {cell}, is bent or twisted by {np.degrees(angle):.0f}° between its nodes, where "
+        "its strains are no approximation any more; give the beam more cells, or check its "
+        "stiffness"
+    )
 
 
 def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: Array) -> str:

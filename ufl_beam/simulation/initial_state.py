@@ -150,16 +150,20 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
     solution, n = given if isinstance(given, tuple) and len(given) == 2 else (given, -1)
     require_kind(solution, Solution, what)
     require_kind(n, (int, np.integer), f"{what}: n of (solution, n)")
-    if (n := solution.index(n)) == len(solution) - 1:
+    if (n := solution.index(n)) == len(solution) - 1 and solution.internal:
         return solution
     scene, numbering = solution.scene, solution.numbering
     owners = [numbering.middle(int(cell)).beam.name for cell in numbering.inelastic_cells[:1]]
     owners += [str(c) for c in scene.all_connectors if remembers(c.law)]
     owners += [str(x) for x in scene.works if isinstance(x, Effect) and x.statement.state]
+    if scene.in_space:  # quaternions do not tell further turns
+        motions = solution.column("connectors")[:,][n, :, 0]
+        pairs = zip(scene.all_connectors, motions, strict=True)
+        owners += [str(c) for c, e in pairs if c.motion == "turning" and abs(e) > 2 * np.pi]
     if owners:
         raise ArgumentError(
-            f"{what}: {owners[0]} has internal variables, and solutions have those of their last "
-            f"state only; end a run at {solution.parameter.at(solution.times[n])}, or call "
+            f"{what}: {owners[0]} has internal variables, and solutions have those of the end of a "
+            f"run only; end a run at {solution.parameter.at(solution.times[n])}, or call end() or "
             "snapshot() of a Simulation there"
         )
     part = type(solution)(scene, numbering, solution)

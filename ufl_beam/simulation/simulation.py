@@ -14,7 +14,6 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, give_back_memory, lib
-from ufl_beam.discretization.cells_in_space import rotations_between
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive, State
@@ -30,7 +29,7 @@ from ufl_beam.output.extremes import ExtremesInC
 from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter, new_rows
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
-from ufl_beam.simulation.diagnosis import no_equilibrium
+from ufl_beam.simulation.diagnosis import no_equilibrium, turned_far
 from ufl_beam.simulation.impacts import Impact, impacts_of
 from ufl_beam.simulation.initial_state import (
     StateOf,
@@ -52,9 +51,6 @@ APPLYING = 1 / 8
 
 LONGEST = 0.05
 """Wall time after which C returns, so that a run can be interrupted and shows its progress; s."""
-
-BENT_FAR = math.pi / 2
-"""Rotation between the nodes of a cell in space from which on the error of a run blames it; rad."""
 
 MOST_VALUES = 2**20
 """Limit of the numbers that C stores in one call for states; at least one state is stored."""
@@ -148,7 +144,8 @@ class Simulation(Stepper):
         elif inertia is not None:
             together(equation.begin_energies, t0, q_local, inertia.v)
         if start is not None:
-            unknown = equation.set_internal_variables(q_local, t0, internal, same=same)
+            remembered = partial(equation.set_internal_variables, same=same)
+            unknown = together(remembered, q_local, t0, internal)
             together(require_known, numbering, start, unknown)
             together(self._require_held, equation, q_local)
         for term in equation.terms:
@@ -377,16 +374,8 @@ class Simulation(Stepper):
         self.end()
         local = [f"{said}." for said in self._force_watch.suspects(self.t)]
         suspects = dict.fromkeys(chain.from_iterable(self.subdomain.comm.allgather(local)))
-        if self.scene.in_space and len(cells := self.numbering.cells):
-            first, second = self.now.turns(0)[cells.T]
-            angles = np.linalg.norm(rotations_between(first, second), axis=1)
-            if (largest := angles.max()) > BENT_FAR:
-                bent = self.numbering.describe_cell(int(angles.argmax()))
-                advice = (
-                    f"A cell, {bent}, is bent or twisted by {np.degrees(largest):.0f}° between its "
-                    "nodes, where its strains are no approximation any more; give the beam more "
-                    "cells, or check its stiffness"
-                )
+        if self.scene.in_space:
+            advice = turned_far(self.now) or advice
         raise no_equilibrium(
             self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
             " ".join([*suspects, advice or self.scheme.advice]), self._free_motion,

@@ -107,8 +107,9 @@ class Solution(States, Rich):
         self.substeps_of_last = UNKNOWN
 
     def count(self, substeps: int, iterations: int) -> None:
-        """Store the numbers of substeps and iterations up to the last state."""
+        """Store the numbers of substeps and iterations up to the last state, which is a new one."""
         self.substeps, self.iterations, self.substeps_of_last = substeps, iterations, substeps
+        self.internal = {}
 
     def downsample(self) -> None:
         """Delete every other state; the first state stays."""
