@@ -122,10 +122,15 @@ def no_equilibrium(
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
+    known = {
+        "guided": "no nearest point was found on its guide curve",
+        "turning": "in space it turns by 360° about an axis that is not its own, where the "
+        "rotation vector has no direction",
+    }
     lost = [
-        f"{c.b}: no nearest point was found on its guide curve"
+        f"{c.b if c.motion == 'guided' else c}: {known[c.motion]}"
         for c in equation.subdomain.numbering.scene.all_connectors
-        if c.motion == "guided" and np.isnan(failure.residuals.get(f"force of {c}", 0.0))
+        if c.motion in known and not np.isfinite(failure.residuals.get(f"force of {c}", 0.0))
     ]
     reasons = [*lost, why, f"{failure} ({sizes})" if sizes else str(failure)]
     if isinstance(failure, Reversal):
