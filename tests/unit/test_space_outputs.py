@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Scenes in space: section forces, extremes, pictures, further joints, friction."""
 
+import csv
 import inspect
 import math
 import re
@@ -400,6 +401,52 @@ def test_section_forces_are_those_of_the_plane():
             assert np.abs(a - b).max() < 1e-4 * size
             assert np.abs(a - b)[[0, -1]].max() < 1e-10 * size
         assert max(np.abs(x).max() for x in (space.V3, space.T, space.M2)) < 1e-10 * size
+
+
+@pytest.mark.serial
+def test_tables_and_accelerations(shared_path):
+    """Names of columns, displacements, and accelerations of free fall with a constant spin."""
+    path, spin = shared_path / "history.csv", np.array([0.0, 0.0, 2.0])
+    ball = ub.Body((1, 0, 0), mass=1.0, inertia=(0.1, 0.1, 0.2), name="ball")
+    place = ball.at(1.5, 0, 0)
+    falling = ub.Scene(
+        [], bodies=[ball], loads=[ub.Gravity((0, 0, -9.81))],
+        initial=[ub.Velocity([ball], angular=tuple(spin), about=(1, 0, 0))],
+    )  # fmt: skip
+    run = ub.simulate(
+        falling, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, progress=False,
+        record=ub.History(path, [place], accelerations=[place]),
+    )  # fmt: skip
+    names, *rows = csv.reader(path.read_text().splitlines())
+    at = str(place)
+    displaced = [f"{c} {at} [m]" for c in "uvw"]
+    assert names[1:7] == displaced + [f"r{c} {at} [rad]" for c in "xyz"]
+    assert (names[9], names[12]) == (f"d2w/dt2 {at} [m/s2]", f"d2rz/dt2 {at} [rad/s2]")
+    table, found = np.array(rows, dtype=float), run.acceleration(place)
+    assert len(names) == table.shape[1]
+    assert np.array_equal(table[:, 1:7], run.displacement(place))
+    assert np.array_equal(table[1:, 7:13], found[1:])
+    assert found.shape == (11, 6)
+    assert np.isnan(found[0]).all()
+    # The midpoint rule: gravity is exact; the centripetal acceleration has the mean of both ends
+    centripetal = np.cross(spin, np.cross(spin, run.position(place) - run.position(ball.middle)))
+    expected = np.array([0, 0, -9.81]) + (centripetal[1:] + centripetal[:-1]) / 2
+    assert np.abs(found[1:, :3] - expected).max() < 1e-3
+    assert np.abs(found[1:, 3:]).max() < 1e-9
+    assert np.array_equal(run.position(ub.ground(1, 2, 3))[-1], (1, 2, 3))
+
+
+@pytest.mark.serial
+def test_columns_of_joints_have_different_names(shared_path):
+    path, axis = shared_path / "joints.csv", (0.2, 0.5, 1.0)
+    ball = ub.Body((0, 0, 0), mass=1.0, inertia=(0.1, 0.1, 0.1))
+    pin = ub.Revolute(ub.ground(0, 0, 0), ball.middle, axis=axis, multipliers=True)
+    ub.simulate(
+        ub.Scene([], bodies=[ball], joints=[pin]), ub.EnergyMomentum(), t=(0, 0.1), dt=0.1,
+        record=ub.History(path, connectors=[pin]), progress=False,
+    )  # fmt: skip
+    (names, *_) = csv.reader(path.read_text().splitlines())
+    assert len(names) == len(set(names)) == 1 + 5 * 3 + 1
 
 
 def test_extremes_are_those_of_the_stored_states():

@@ -167,8 +167,10 @@ def momentum_in_space(numbering: DofNumbering, q: Array, p: Array, turns: Array)
 def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) -> Rotation:
     """Return the rotations of the frame at a place; the column ``turns`` is (n, nodes, 4)."""
     if isinstance(place, BodyPoint):
-        body = numbering.scene.rigid_bodies.index(place.body)
-        return _rotations(turns[:, len(numbering.points) + body])
+        bodies = numbering.scene.rigid_bodies
+        if place.body not in bodies:  # the ground, to which nothing is joined
+            return Rotation.identity(len(turns[:, 0]))
+        return _rotations(turns[:, len(numbering.points) + bodies.index(place.body)])
     nodes, weights = numbering.weights(place)
     a, b = (turns[:, node] for node in nodes)
     return _rotations(a) * Rotation.from_rotvec(weights[1] * rotations_between(a, b))

@@ -44,8 +44,7 @@ from ufl_beam.parallel import on_first
 
 # -- table -----------------------------------------------------------------------------------------
 
-MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
-ACCELERATION = (("d2u/dt2", "m/s2"), ("d2v/dt2", "m/s2"), ("d2psi/dt2", "rad/s2"))
+MOTION = {3: "u v psi", 6: "u v w rx ry rz"}  # columns of a place, by number of unknowns of a node
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of formulas in spreadsheets
 COMPONENTS = ("along", "across", "turn")  # motions of a bushing
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
@@ -54,11 +53,11 @@ CONNECTOR = ("motion", "force", "work")  # columns of a connector
 class History(FileRecorder):
     """Recorder of motions, connectors and energies in a CSV file that is valid after a crash.
 
-    The columns are the time or load factor; u, v, psi of each place; accelerations; motion, force,
-    work of each connector; and the entries of the energy ledger.  The names of the columns end in
-    their units.  Accelerations are means since the previous row, as in
-    :meth:`Solution.acceleration`; in the first row they are NaN.  They are not
-    changed if ``max_rows`` deletes that row.
+    The columns are the time or load factor; u, v, psi of each place, in space u, v, w, and the
+    rotation vector rx, ry, rz; accelerations; motion, force, work of each connector; and the
+    entries of the energy ledger.  The names of the columns end in their units.  Accelerations are
+    means since the previous row, as in :meth:`Solution.acceleration`; in the first row they are
+    NaN.  They are not changed if ``max_rows`` deletes that row.
 
     Args:
         path: File, ending in ``.csv``.
@@ -112,16 +111,18 @@ class History(FileRecorder):
             for followed in self._connectors
             for connector, name in _named_components(simulation.scene, followed)
         }
-        names = [f"{c} {place} [{unit}]" for place in self._places for c, unit in MOTION]
-        names += [f"{c} {x} [{unit}]" for x in self._accelerated for c, unit in ACCELERATION]
+        moved = MOTION[width := simulation.numbering.width].split()
+        units = {c: "m" if c in "uvw" else "rad" for c in moved}
+        names = [f"{c} {place} [{units[c]}]" for place in self._places for c in moved]
+        names += [f"d2{c}/dt2 {x} [{units[c]}/s2]" for x in self._accelerated for c in moved]
         if self._accelerated and not has_inertia(simulation.scheme):
             raise ArgumentError(
                 f"History {self._path}: accelerations: the run is static; there are none"
             )
         for connector, name in self._followed.items():
             is_rotation = simulation.scene.all_connectors[connector].is_rotation
-            units = ("rad", "N m", "J") if is_rotation else ("m", "N", "J")
-            names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
+            of_column = ("rad", "N m", "J") if is_rotation else ("m", "N", "J")
+            names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, of_column, strict=True)]
         energies = [f"{name} [J]" for group in simulation.entries() for name in group]
         for twice in {*names} & {*energies}:
             raise ArgumentError(
@@ -131,7 +132,7 @@ class History(FileRecorder):
         columns = [simulation.parameter.column, *names, *energies]
         # Spreadsheets read such names as formulas, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
-        self._before = np.full((len(self._accelerated), 4), np.nan)
+        self._before = np.full((len(self._accelerated), 1 + width), np.nan)
         self._every = self._first_every
         super().begin(simulation, state)
         if state is not None:
@@ -219,11 +220,19 @@ def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[i
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
         return [(n, f"{followed}, {name}") for n, name in zip(connectors, names, strict=False)]
     holders = [scene.all_connectors[connector] for connector in connectors]
-    axes = ["psi" if c.is_rotation else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
+    axes = [_axis(holder) for holder in holders]
     return [
         (connector, f"{holder}, {axis}" if len(connectors) > 1 else str(holder))
         for connector, holder, axis in zip(connectors, holders, axes, strict=True)
     ]
+
+
+def _axis(holder: Connector) -> str:
+    """Return the component of the scene that is nearest to the motion of a connector."""
+    if holder.is_rotation and len(holder.axis) == 2:
+        return "psi"
+    axis = np.cross(holder.other, holder.axis) if holder.motion == "aligning" else holder.axis
+    return "r" * holder.is_rotation + "xyz"[int(np.argmax(np.abs(axis)))]
 
 
 # -- events ----------------------------------------------------------------------------------------
