@@ -26,7 +26,7 @@ def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
 
     Returns:
         The tangent of the degrees of freedom that no support holds, their numbers in the scene, and
-        the results of :func:`null_vectors`; None if the tangent is empty or not finite.
+        the results of :func:`null_vectors`; None if the tangent is zero or not finite.
     """
     subdomain, A, dofs = equation.subdomain, equation.A, equation.subdomain.dofs
     local = dofs[A.rows()], dofs[A.indices], A.data, dofs[equation.supports.dofs]
@@ -35,7 +35,7 @@ def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
     n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
     K = csc_array(coo_array((data, (rows, columns)), shape=(n, n)).tocsc()[:, free][free])
-    if not len(free) or not np.isfinite(K.data).all():
+    if not K.data.any() or not np.isfinite(K.data).all():
         return None
     try:
         return K, free, *null_vectors(K)
