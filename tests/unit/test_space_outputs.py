@@ -359,6 +359,33 @@ def test_section_forces_are_in_equilibrium():
     assert np.abs(run.displacement(tip.end)[-1, 3:]).max() > 0.9
 
 
+LOADS_ALONG = {
+    "pressure": lambda beam: ub.Pressure(
+        beam, normal=(20, -30), tangential=10, profile=lambda s: 1 + s * s, amplitude=lambda t: t
+    ),
+    "part of it": lambda beam: ub.Pressure(beam, normal=(20, -30), span=(0, 0.3)),
+    "rotating frame": lambda _: ub.RotatingFrame(rate=(1, 0.5, 2), about=(0.1, 0.2, 0.3)),
+    "moving force": lambda beam: ub.MovingLoad(beam, lambda t: 0.1 * t, force=(50, 30, -60)),
+}
+
+
+@pytest.mark.parametrize("kind", LOADS_ALONG)
+def test_section_forces_balance_all_loads_along_beams(kind):
+    """At the foot, whose cell is loaded, and at the free end."""
+    massive = ub.Section(**{**STIFF, "rhoI": 0.0}, **{**OTHER, "rhoI2": 0.0})  # acts in the cells
+    root = ub.Beam((0, 0, 0), (2, 1, 0.5), massive, cells=3, up=(0.1, 0, 1), name="root")
+    foot = ub.Clamped(root.start)
+    run = ub.simulate(
+        ub.Scene([root], supports=[foot], loads=[LOADS_ALONG[kind](root)]),
+        ub.Static(), t=(0, 1), dt=0.25, **RUN,
+    )  # fmt: skip
+    reaction = run.reaction(foot)[-1]
+    own = np.hstack([in_section(run, root.start, root.up, x) for x in np.split(reaction, 2)])
+    size = np.abs(reaction).max()
+    assert np.abs(run.section_forces_at(root.start)[-1] + own).max() < 1e-9 * size
+    assert np.abs(run.section_forces_at(root.end)[-1]).max() < 1e-9 * size
+
+
 def test_section_forces_of_a_simple_beam():
     """Under its weight: closed forms at all points, for small deflections."""
     q, length = 9.81e-3, 3.0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -109,6 +110,16 @@ class CellsOfState(NamedTuple):
         """Return the strains along, and curvatures about, axes 1, 2, 3; (n, 6); 1, 1/m."""
         curvatures = self.frames(0.5).apply(self.between / self.lengths[:, None])
         return np.asarray(self.in_section(0.5, self.slopes, curvatures) - np.eye(6)[0])
+
+    def forces_on_axis(self, p: Sequence[float]) -> Array:
+        """Return forces per deformed length times this length; (n, 3); N.
+
+        They are along the axis, and normal to it in the directions of the axes 2 and 3.
+        """
+        middle = self.frames(0.5)
+        second, third = (middle.apply(self.axes[:, :, i]) for i in (1, 2))
+        normal = p[1] * np.cross(third, self.slopes) + p[2] * np.cross(self.slopes, second)
+        return np.asarray(self.lengths[:, None] * (p[0] * self.slopes + normal))
 
     def section_forces(
         self, fractions: Array, resultants: Array, along: Array, *, in_scene: bool = False
