@@ -44,12 +44,6 @@ def require_stiffness(value: float | None, what: str) -> None:
         require_number(value, what, positive=True)
 
 
-def require_inertia(value: float | None, what: str) -> None:
-    """Raise :class:`ModelError` unless ``value`` is a number that is not negative, or None."""
-    if value is not None:
-        require_number(value, what, at_least=0.0)
-
-
 RESULTANTS = {"axial": "EA", "shear": "GA", "bending": "EI"}
 """Laws of the resultants in the plane, with their stiffnesses, in the order of the strains."""
 
@@ -126,7 +120,7 @@ class Section(Record):
     GA3: Annotated[float | None, require_stiffness] = None
     EI2: Annotated[float | None, require_stiffness] = None
     GJ: Annotated[float | None, require_stiffness] = None
-    rhoI2: Annotated[float | None, require_inertia] = None
+    rhoI2: NotNegative = field(default=None)  # type: ignore[assignment]
     centroid_only: Switch = False
     shear3: ResultantLaw = None
     twisting: ResultantLaw = None
