@@ -324,6 +324,39 @@ WRONG = {
         "up = (0.0, 0.0, 1.0) is along",
     ),
     "up in the plane": (lambda: ub.Beam((0, 0), (1, 0), BEAM.section, up=(0, 1)), "in space"),
+    "up along a short leg": (
+        lambda: ub.Beam.polyline([(0, 0, 0), (1, 0, 0), (1, 0, 0.1)], BEAM.section, cells=2),
+        "is along the beam",
+    ),
+    "axis of a hinge": (
+        lambda: ub.Beam.polyline(
+            [(1, 0, -1), (0, 0, 0), (1, 0, 1)],
+            BEAM.section,
+            cells=4,
+            hinges={0.5: ub.Softening(1.0, 1.0)},
+        ),
+        "is along the beam",
+    ),
+    "ring around up": (
+        lambda: ub.Beam(
+            (0, 0, 0),
+            (-1, 0, 1),
+            BEAM.section,
+            cells=9,
+            curve=lambda s: (np.sin(1.5 * np.pi * s), 0, 1 - np.cos(1.5 * np.pi * s)),
+        ),
+        "axis 2 of the section is reversed at s = 0.333",
+    ),
+    "turn without axis": (
+        lambda: ub.Turn(ub.ground(0, 0, 0), BEAM.end, ub.Spring(1.0), axis=None),
+        "in space give axis=(x, y, z)",
+    ),
+    "release": (
+        lambda: ub.Scene(
+            [BEAM], joints=[ub.Release(BEAM.end, ub.ground(*BEAM.end.point), free="V")]
+        ),
+        "Release is for scenes in the plane",
+    ),
     "no torsion": (lambda: ub.Scene([ub.Beam((0, 0, 0), (1, 0, 0), PLANAR)]), "no GA3, EI2, GJ"),
     "planar force": (
         lambda: ub.Scene([BEAM], loads=[ub.PointLoad(BEAM.end, force=(1, 0))]),

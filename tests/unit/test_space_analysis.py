@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from test_space import OTHER, PLANAR, STIFF
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 
 def flat_modes(shapes):
@@ -40,6 +41,22 @@ def test_planar_modes_in_a_turned_plane(loads):
     found = space.omega[flat_modes(space)]
     assert np.abs(found[:4] / plane.omega - 1).max() < 1e-9
     assert len(found) < 12  # others are out of the plane
+
+
+def test_lengths_of_shapes_do_not_depend_on_axes():
+    """The largest displacement is a vector of length 1, and that of an imperfection as given."""
+    along = np.array([1.0, 2, 2]) / 3
+    column = ub.Beam((0, 0, 0), tuple(along), ub.Section(**STIFF, **OTHER), name="column")
+    load = ub.PointLoad(column.end, force=tuple(-along))
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=[load])
+    for shapes in (ub.modes(scene, 3), ub.buckling(scene, 1)):
+        for k in range(len(shapes)):
+            moved = shapes.shapes[shapes.numbering.dofs[:, :3], k]
+            size = np.linalg.norm(moved, axis=1).max()
+            assert abs(size - 1) < 1e-14 or size < 1e-9  # torsion
+    crooked = st.imperfect(scene, mode=shapes, amplitude=0.01)
+    moved = np.subtract(crooked["column"].end.point, column.end.point)
+    assert abs(np.linalg.norm(moved) - 0.01) < 1e-15
 
 
 def test_planar_buckling_in_a_turned_plane():

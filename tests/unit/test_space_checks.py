@@ -219,3 +219,18 @@ def test_connectors_whose_motions_are_held():
     with pytest.warns(ub.ModelWarning, match="is held at zero by Revolute") as warned:
         run(ub.Scene([ARM, post], joints=[hinge], supports=[FOOT], connectors=[still, free]))
     assert [str(x.message).partition(":")[0] for x in warned] == [str(still)]
+
+
+def test_a_jump_of_a_driven_axis_is_named():
+    """The tangent of a step that is refused at once is zero."""
+    turned = ub.PrescribedDisplacement(
+        ARM.start, u=0.0, v=0.0, w=0.0, axis=(0, 0, 1), psi=lambda t: 0.0 if t < 0.05 else 3.0
+    )
+    with pytest.raises(ub.ConvergenceError, match="turns by 172° in the step, more than the limit"):
+        run(ub.Scene([ARM], supports=[turned]))
+
+
+def test_zero_vectors_of_the_plane_are_those_of_space():
+    spin = ub.Velocity([ARM], angular=(0, 0, 1.0), about=(0.0, 0.0))
+    moving = run(ub.Scene([ARM], initial=[spin]))
+    assert moving.velocity(ARM.end)[0, 1] == 1.0

@@ -296,7 +296,10 @@ def test_balance_of_hinges_about_several_axes():
 @pytest.mark.serial
 @pytest.mark.parametrize("kind", ["between nodes", "in a cell", "about two axes"])
 def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
-    """A cell is turned about axis 3 by a motor, to the derivative of the series of the angle."""
+    """A cell is turned about axis 3 by a motor.
+
+    In a cell the derivative of the series of the angle has a relative error of 6e-9 at 330 degrees.
+    """
     law, stiff = (
         ub.LinearSoftening(8.0, fracture_energy=60.0),
         STIFF | OTHER | {"EA": 1e6, "GA": 1e6},
@@ -325,7 +328,8 @@ def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
         jump = run.connector(turns[0] if turns else run.scene.hinges[0]).motion
     moment = -run.connector(motor).force
     opened = slice(5, None)
-    assert np.allclose(moment[opened], law.traction(np.abs(jump[opened])), rtol=1e-8)
+    rtol = 1e-8 if kind == "in a cell" else 1e-9
+    assert np.allclose(moment[opened], law.traction(np.abs(jump[opened])), rtol=rtol)
     assert np.allclose(run.section_forces(beam)[0, 5], moment[-1], rtol=1e-7)
     area = 8.0 * np.abs(jump[-1]) - 8.0**2 / (4 * 60.0) * jump[-1] ** 2  # of the law, to the jump
     assert np.isclose(run.energy["hinges"][-1], area, rtol=1e-8)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Scenes in space: section forces, extremes, pictures, further joints, friction."""
 
+import csv
 import inspect
 import math
 import re
@@ -380,6 +381,33 @@ def test_section_forces_are_in_equilibrium():
     assert np.abs(run.displacement(tip.end)[-1, 3:]).max() > 0.9
 
 
+LOADS_ALONG = {
+    "pressure": lambda beam: ub.Pressure(
+        beam, normal=(20, -30), tangential=10, profile=lambda s: 1 + s * s, amplitude=lambda t: t
+    ),
+    "part of it": lambda beam: ub.Pressure(beam, normal=(20, -30), span=(0, 0.3)),
+    "rotating frame": lambda _: ub.RotatingFrame(rate=(1, 0.5, 2), about=(0.1, 0.2, 0.3)),
+    "moving force": lambda beam: ub.MovingLoad(beam, lambda t: 0.1 * t, force=(50, 30, -60)),
+}
+
+
+@pytest.mark.parametrize("kind", LOADS_ALONG)
+def test_section_forces_balance_all_loads_along_beams(kind):
+    """At the foot, whose cell is loaded, and at the free end."""
+    massive = ub.Section(**{**STIFF, "rhoI": 0.0}, **{**OTHER, "rhoI2": 0.0})  # acts in the cells
+    root = ub.Beam((0, 0, 0), (2, 1, 0.5), massive, cells=3, up=(0.1, 0, 1), name="root")
+    foot = ub.Clamped(root.start)
+    run = ub.simulate(
+        ub.Scene([root], supports=[foot], loads=[LOADS_ALONG[kind](root)]),
+        ub.Static(), t=(0, 1), dt=0.25, **RUN,
+    )  # fmt: skip
+    reaction = run.reaction(foot)[-1]
+    own = np.hstack([in_section(run, root.start, root.up, x) for x in np.split(reaction, 2)])
+    size = np.abs(reaction).max()
+    assert np.abs(run.section_forces_at(root.start)[-1] + own).max() < 1e-9 * size
+    assert np.abs(run.section_forces_at(root.end)[-1]).max() < 1e-9 * size
+
+
 def test_section_forces_of_a_simple_beam():
     """Under its weight: closed forms at all points, for small deflections."""
     q, length = 9.81e-3, 3.0
@@ -395,6 +423,52 @@ def test_section_forces_of_a_simple_beam():
     assert np.abs(found.M3 + q * left**2 / 2).max() < 1e-5 * q * length**2
     assert np.abs(found.M2 - 1e-3 * left**2 / 2).max() < 1e-5 * q * length**2
     assert max(np.abs(x).max() for x in (found.N, found.T)) < 1e-4 * q * length
+
+
+@pytest.mark.serial
+def test_tables_and_accelerations(shared_path):
+    """Names of columns, displacements, and accelerations of free fall with a constant spin."""
+    path, spin = shared_path / "history.csv", np.array([0.0, 0.0, 2.0])
+    ball = ub.Body((1, 0, 0), mass=1.0, inertia=(0.1, 0.1, 0.2), name="ball")
+    place = ball.at(1.5, 0, 0)
+    falling = ub.Scene(
+        [], bodies=[ball], loads=[ub.Gravity((0, 0, -9.81))],
+        initial=[ub.Velocity([ball], angular=tuple(spin), about=(1, 0, 0))],
+    )  # fmt: skip
+    run = ub.simulate(
+        falling, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, progress=False,
+        record=ub.History(path, [place], accelerations=[place]),
+    )  # fmt: skip
+    names, *rows = csv.reader(path.read_text().splitlines())
+    at = str(place)
+    displaced = [f"{c} {at} [m]" for c in "uvw"]
+    assert names[1:7] == displaced + [f"r{c} {at} [rad]" for c in "xyz"]
+    assert (names[9], names[12]) == (f"d2w/dt2 {at} [m/s2]", f"d2rz/dt2 {at} [rad/s2]")
+    table, found = np.array(rows, dtype=float), run.acceleration(place)
+    assert len(names) == table.shape[1]
+    assert np.array_equal(table[:, 1:7], run.displacement(place))
+    assert np.array_equal(table[1:, 7:13], found[1:])
+    assert found.shape == (11, 6)
+    assert np.isnan(found[0]).all()
+    # The midpoint rule: gravity is exact; the centripetal acceleration has the mean of both ends
+    centripetal = np.cross(spin, np.cross(spin, run.position(place) - run.position(ball.middle)))
+    expected = np.array([0, 0, -9.81]) + (centripetal[1:] + centripetal[:-1]) / 2
+    assert np.abs(found[1:, :3] - expected).max() < 1e-3
+    assert np.abs(found[1:, 3:]).max() < 1e-9
+    assert np.array_equal(run.position(ub.ground(1, 2, 3))[-1], (1, 2, 3))
+
+
+@pytest.mark.serial
+def test_columns_of_joints_have_different_names(shared_path):
+    path, axis = shared_path / "joints.csv", (0.2, 0.5, 1.0)
+    ball = ub.Body((0, 0, 0), mass=1.0, inertia=(0.1, 0.1, 0.1))
+    pin = ub.Revolute(ub.ground(0, 0, 0), ball.middle, axis=axis, multipliers=True)
+    ub.simulate(
+        ub.Scene([], bodies=[ball], joints=[pin]), ub.EnergyMomentum(), t=(0, 0.1), dt=0.1,
+        record=ub.History(path, connectors=[pin]), progress=False,
+    )  # fmt: skip
+    (names, *_) = csv.reader(path.read_text().splitlines())
+    assert len(names) == len(set(names)) == 1 + 5 * 3 + 1
 
 
 def test_extremes_are_those_of_the_stored_states():

@@ -299,6 +299,10 @@ class SmallMotions(Linearization):
         sizes[np.ix_(rotations, only)] = np.abs(shapes[np.ix_(rotations, only)])
         largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
         shapes = shapes / largest
+        if self.scene.in_space:  # lengths of vectors, which do not depend on the axes
+            nodes = np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[:, :3]
+            lengths = np.linalg.norm(shapes[nodes], axis=1).max(axis=0)
+            shapes = shapes / np.where(only, 1.0, lengths)
         real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
         return values[order], np.asarray(shapes.real if real else shapes)
 

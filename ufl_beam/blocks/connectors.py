@@ -33,8 +33,14 @@ from ufl_beam.compiled.simd_kernels import BATCH, in_batches
 from ufl_beam.discretization.state_io import NOWHERE, Archive
 from ufl_beam.mechanics.kinematics import COMPONENTS
 from ufl_beam.mechanics.relative_motions import MOTIONS, Geometry, Pair
-from ufl_beam.mechanics.spatial_kinematics import Turn, beyond
-from ufl_beam.mechanics.spatial_motions import SPATIAL_MOTIONS, GeometryInSpace, NodeInStep
+from ufl_beam.mechanics.spatial_kinematics import Turn
+from ufl_beam.mechanics.spatial_motions import (
+    SPATIAL_MOTIONS,
+    TURNING,
+    GeometryInSpace,
+    NodeInStep,
+    whole_turns,
+)
 from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Controller
@@ -48,8 +54,8 @@ WITHOUT_PLACES = "turning", "guided"
 PLACES = [f"{vector} {c}" for vector in Geometry._fields for c in "xy"]
 """Names of the components of a :class:`Geometry`."""
 
-PLACES_IN_SPACE = [f"{vector} {c}" for vector in GeometryInSpace._fields for c in "xyz"]
-"""Names of the components of a :class:`GeometryInSpace`."""
+PLACES_IN_SPACE = [f"{vector} {c}" for vector in GeometryInSpace._fields[:-1] for c in "xyz"]
+"""Names of the components of the vectors of a :class:`GeometryInSpace`."""
 
 RECORDED = {
     "motion": lib.RECORDED_STATE, "work": lib.RECORDED_WORK, "rate": lib.RECORDED_STEP,
@@ -149,10 +155,10 @@ class OnConnector(Statement):
     def state(self) -> list[str]:
         """Forces at the end of the last step, if they are in the work of a step; variables.
 
-        In space the double turns of rotations and the quaternions of both nodes follow.
+        In space whole turns, and the quaternions of both nodes follow.
         """
         before = bool(self.scheme.weight_of_before)
-        turns = [f"turns {k}" for k, x in enumerate(self.motions) if x == "turning in space"]
+        turns = [f"whole turns {k}" for k, x in enumerate(self.motions) if x == TURNING]
         turns += [x for k in range(2 * self.in_space) for x in quaternion_names(k)]
         return [*(f"force {k}" for k in range(before * self.laws)), *self.data.variables, *turns]
 
@@ -214,7 +220,7 @@ class OnConnector(Statement):
         return found, {}
 
     def _in_space(self, at: Inputs, virtual: Any) -> tuple[list[tuple[Expr, ...]], dict[str, Expr]]:
-        """Return the same of motions in space; the state is the quaternions of the nodes.
+        """Return the same of motions in space; the state is whole turns, and quaternions of nodes.
 
         If the statement has rates, each motion also has its rate before the step, which is its
         variation by the velocities in a step of zero.
@@ -236,10 +242,10 @@ class OnConnector(Statement):
         for k, motion in enumerate(self.motions):
             given = np.reshape([at[f"{name} {k}"] for name in PLACES_IN_SPACE], (-1, 3))
             geometry = GeometryInSpace(*map(tuple, given.tolist()))
+            if motion == TURNING:
+                geometry = geometry._replace(whole=at[f"whole turns {k}"])
+                state[f"whole turns {k}"] = whole_turns(a, b, geometry)
             moved = [*SPATIAL_MOTIONS[motion](a, b, geometry, self.scheme)]
-            if motion == "turning in space":  # quaternions return after two turns
-                state[f"turns {k}"] = at[f"turns {k}"] + beyond(moved[1], 2 * math.pi)
-                moved[:2] = (x + 4 * math.pi * at[f"turns {k}"] for x in moved[:2])
             if at_rest:
                 begun = at_rest[0], at_rest[1], geometry, self.scheme
                 moved.append(SPATIAL_MOTIONS[motion](*begun)[2])

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -110,6 +111,16 @@ class CellsOfState(NamedTuple):
         curvatures = self.frames(0.5).apply(self.between / self.lengths[:, None])
         return np.asarray(self.in_section(0.5, self.slopes, curvatures) - np.eye(6)[0])
 
+    def forces_on_axis(self, p: Sequence[float]) -> Array:
+        """Return forces per deformed length times this length; (n, 3); N.
+
+        They are along the axis, and normal to it in the directions of the axes 2 and 3.
+        """
+        middle = self.frames(0.5)
+        second, third = (middle.apply(self.axes[:, :, i]) for i in (1, 2))
+        normal = p[1] * np.cross(third, self.slopes) + p[2] * np.cross(self.slopes, second)
+        return np.asarray(self.lengths[:, None] * (p[0] * self.slopes + normal))
+
     def section_forces(
         self, fractions: Array, resultants: Array, along: Array, *, in_scene: bool = False
     ) -> Array:
@@ -167,8 +178,10 @@ def momentum_in_space(numbering: DofNumbering, q: Array, p: Array, turns: Array)
 def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) -> Rotation:
     """Return the rotations of the frame at a place; the column ``turns`` is (n, nodes, 4)."""
     if isinstance(place, BodyPoint):
-        body = numbering.scene.rigid_bodies.index(place.body)
-        return _rotations(turns[:, len(numbering.points) + body])
+        bodies = numbering.scene.rigid_bodies
+        if place.body not in bodies:  # the ground, to which nothing is joined
+            return Rotation.identity(len(turns[:, 0]))
+        return _rotations(turns[:, len(numbering.points) + bodies.index(place.body)])
     nodes, weights = numbering.weights(place)
     a, b = (turns[:, node] for node in nodes)
     return _rotations(a) * Rotation.from_rotvec(weights[1] * rotations_between(a, b))

@@ -10,9 +10,9 @@ variations by means of both ends are exact increments.
 
 from __future__ import annotations
 
-import math
 from copy import copy
-from typing import NamedTuple
+from math import pi
+from typing import Any, NamedTuple
 
 import ufl
 from ufl.core.expr import Expr
@@ -22,8 +22,6 @@ from ufl_beam.mechanics.spatial_kinematics import (
     Turn,
     Vector,
     add,
-    below_a_turn,
-    beyond,
     conjugate,
     cross,
     dot,
@@ -36,9 +34,6 @@ from ufl_beam.mechanics.spatial_kinematics import (
 )
 from ufl_beam.mechanics.time_scheme import Scheme, acts_at_end
 
-ABOUT_AXIS = 1e-6
-"""Sine of half the rotation across an axis up to which b turns about this axis."""
-
 
 class GeometryInSpace(NamedTuple):
     """Vectors (3,) that a relative motion depends on besides the nodes; m."""
@@ -48,6 +43,7 @@ class GeometryInSpace(NamedTuple):
     apart: Vector  # from point a to point b in the undeformed scene
     axis: Vector  # dimensionless unit vector
     other: Vector  # unit vector that is fixed in b
+    whole: Any = 0.0  # whole turns about the axis before the step
 
 
 class NodeInStep:
@@ -158,25 +154,44 @@ def turning_in_space(
 ) -> tuple[Expr, Expr, Expr]:
     """Return the component along an axis, fixed in a and b, of the rotation vector of b; rad.
 
-    Beyond half a turn about the axis itself, b is given the quaternion of the other sign, whose
-    rotation vector is a turn shorter; so the formulas have no singularity at a turn.
+    Whole turns are added.  The motion is infinite if the rest passes 360 degrees in the step, where
+    the rotation vector is reversed.
     """
-    turns, zero = (a.turn, copy(b.turn)), (0.0, 0.0, 0.0)
-    r = product(conjugate(a.turn.q0), b.turn.q0)
-    along = dot(n.axis, r[1:])
-    across = dot(r[1:], r[1:]) - along**2
-    about_axis = ufl.conditional(ufl.lt(across, ABOUT_AXIS**2), beyond(along, 0.0), 0.0)
-    turn = ufl.conditional(ufl.lt(r[0], 0.0), about_axis, 0.0)
-    for q in ("q0", "q1"):
-        setattr(turns[1], q, scale(1 - 2 * abs(turn), getattr(b.turn, q)))
+    turns, zero = (a.turn, _less_whole_turns(b, n)), (0.0, 0.0, 0.0)
     old, now = (Middle(_same, *(getattr(x, q) for x in turns)) for q in ("q0", "q1"))
-    values = [dot(n.axis, x.rotation_vector) + 2 * math.pi * turn for x in (old, now)]
-    values[1] *= below_a_turn(turns)
+    before, after = (
+        dot(n.axis, middle.rotation_vector) + 2 * pi * n.whole for middle in (old, now)
+    )
+    valid = ufl.conditional(ufl.lt(dot(old.r[1:], now.r[1:]), 0.0), 0.0, 1.0)
+    after /= ufl.conditional(ufl.lt(old.r[0] + now.r[0], 0.0), valid, 1.0)
     some = turns
     if acts_at_end(scheme):
         old, some = now, (turns[0].at_end, turns[1].at_end)
     _, of_a, of_b = forces_over_step(_same, some, (old, now), (zero, zero), 1.0, (zero, n.axis))
-    return values[0], values[1], dot(of_a, a.w_θ) + dot(of_b, b.w_θ)
+    return before, after, dot(of_a, a.w_θ) + dot(of_b, b.w_θ)
+
+
+def _less_whole_turns(b: NodeInStep, n: GeometryInSpace) -> Any:
+    """Return the rotation of b; its quaternions have the other sign after each whole turn."""
+    turn, sign = copy(b.turn), ufl.cos(pi * n.whole)
+    turn.q0, turn.q1 = scale(sign, turn.q0), scale(sign, turn.q1)
+    return turn
+
+
+ON_AXIS = 2e-12
+"""Largest square of the sine of the angle between the axes of a rotation that may turn wholly."""
+
+
+def whole_turns(a: NodeInStep, b: NodeInStep, n: GeometryInSpace) -> Expr:
+    """Return the whole turns about the axis after the step; the rest is at most 180 degrees.
+
+    They do not change if b turns about another axis.
+    """
+    r = product(conjugate(a.turn.q1), _less_whole_turns(b, n).q1)
+    along, size = dot(n.axis, r[1:]), dot(r[1:], r[1:])
+    way = ufl.conditional(ufl.gt(along, 0.0), 1.0, -1.0)
+    on_axis = ufl.conditional(ufl.gt(along * along, (1 - ON_AXIS) * size), way, 0.0)
+    return n.whole + ufl.conditional(ufl.lt(r[0], 0.0), on_axis, 0.0)
 
 
 def _same(x: Expr) -> Expr:
@@ -191,3 +206,6 @@ SPATIAL_MOTIONS = {
     )
 }  # fmt: skip
 """Relative motions in space by name."""
+
+TURNING = "turning in space"
+"""Motion that counts whole turns."""

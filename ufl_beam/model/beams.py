@@ -140,13 +140,31 @@ class Beam(Record, Member):
                 f"{self.name}: up = {up} gives axes to sections in space, so that ends of the beam "
                 "and up have three coordinates"
             )
-        points = [np.array(self.curve(i / self.cells)) for i in range(self.cells + 1)]
-        for a, b in pairwise(points):
-            if np.linalg.norm(np.cross(b - a, up)) <= 1e-9 * math.hypot(*(b - a)) * math.hypot(*up):
+        at = self.vertices(())
+        ends = [*pairwise(at), *(self._around(place.s) for place in self.hinge_laws)]
+        first = np.array([np.subtract(self.curve(b), self.curve(a)) for a, b in ends])
+        third, size = np.cross(first, up), np.linalg.norm(first, axis=1)
+        sines = np.linalg.norm(third, axis=1)
+        if (sines <= 1e-9 * size * math.hypot(*up)).any():
+            raise ModelError(
+                f"{self.name}: up = {up} is along the beam; give a vector across it, which "
+                "becomes axis 2 of the section"
+            )
+        third /= sines[:, None]
+        second = np.cross(third, first / size[:, None])
+        cells = slice(len(at) - 1)
+        cosines = [np.sum(x[cells][1:] * x[cells][:-1], axis=1) for x in (second, third)]
+        for s, twist in zip(at[1:-1], np.add(*cosines), strict=True):
+            if twist < 0 and s not in self.corners:
                 raise ModelError(
-                    f"{self.name}: up = {up} is along the beam; give a vector across it, which "
-                    "becomes axis 2 of the section"
+                    f"{self.name}: axis 2 of the section is reversed at s = {s:.3g}, where the "
+                    f"beam passes the direction of up = {up}; give an up across the beam "
+                    "everywhere, such as the normal of its plane"
                 )
+
+    def _around(self, s: float) -> tuple[float, float]:
+        """Return the ends of a chord as long as a cell about a place."""
+        return max(s - 0.5 / self.cells, 0.0), min(s + 0.5 / self.cells, 1.0)
 
     def _require_hinges(self) -> None:
         """Raise :class:`ModelError` unless places and laws of the hinges suit the beam."""
@@ -168,8 +186,7 @@ class Beam(Record, Member):
 
     def third_axis(self, s: float) -> Point:
         """Return axis 3 of the section at a place in space, for the chord of a cell about it."""
-        ends = (max(s - 0.5 / self.cells, 0.0), min(s + 0.5 / self.cells, 1.0))
-        a, b = (np.array(self.curve(x)) for x in ends)
+        a, b = (np.array(self.curve(x)) for x in self._around(s))
         normal = np.cross(b - a, np.array(self.up))
         return tuple((normal / np.linalg.norm(normal)).tolist())
 

@@ -399,7 +399,7 @@ class Velocity(Record):
     def at(self, x: float, y: float, *z: float) -> tuple[float, ...]:
         """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s; in space six rates."""
         if z:
-            arm = np.array([x, y, *z]) - (self.about or (0.0, 0.0, 0.0))
+            arm = np.subtract((x, y, *z), (*(self.about or ()), 0.0, 0.0, 0.0)[:3])
             spin = np.broadcast_to(self.angular, 3)  # it may be the default of the plane
             return *((*self.linear, 0.0)[:3] + np.cross(spin, arm)), *spin
         about_x, about_y = self.about or (0.0, 0.0)

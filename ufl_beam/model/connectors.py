@@ -175,8 +175,8 @@ class Turn(Connector):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     In space, the motion is the component of the rotation vector along an ``axis`` that is fixed in
-    both places.  Rotations about the axis are not limited; others are below 360 degrees, and a step
-    beyond fails.
+    both places.  It may be any number of turns about the axis of a joint, such as a
+    :class:`Revolute`.  A rotation about other axes must stay below 360 degrees.
 
     Example:
         >>> soft = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7))  # N m/rad
@@ -196,7 +196,7 @@ class Turn(Connector):
     def __post_init__(self) -> None:
         super().__post_init__()
         in_space = len(self.a.point) == 3
-        if in_space == (isinstance(self.axis, tuple) and self.axis == Turn.axis):
+        if in_space == (self.axis is None or np.array_equal(self.axis, Turn.axis)):
             raise ModelError(f"{self}: in space give axis=(x, y, z); in the plane there is none")
         if in_space:
             object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Turn"))

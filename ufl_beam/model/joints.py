@@ -510,7 +510,7 @@ class Release(_AtPoint):
             raise ModelError(f"{self}: free = {self.free!r} must be letters of 'NVM'")
         if 0 in self.joined:
             return
-        x, y = self.a.direction
+        x, y, *_ = self.a.direction
         axes = {"N": (x, y), "V": (-y, x)}
         holders = [
             self._hold("sliding", axis) for name, axis in axes.items() if name not in self.free

@@ -106,7 +106,7 @@ class Section(Record):
     GA3: PositiveOrNone = None
     EI2: PositiveOrNone = None
     GJ: PositiveOrNone = None
-    rhoI2: PositiveOrNone = None
+    rhoI2: NotNegative = field(default=None)  # type: ignore[assignment]
     centroid_only: Switch = False
     shear3: ResultantLaw = None
     twisting: ResultantLaw = None

@@ -37,7 +37,7 @@ from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import Gravity, LineLoad
+from ufl_beam.model.loads import Gravity, LineLoad, MovingLoad, Pressure, RotatingFrame
 from ufl_beam.model.scene import index_of
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
@@ -67,7 +67,8 @@ from ufl_beam.output.state_rows import (
     new_rows,
     signs_on_second_place,
 )
-from ufl_beam.terms.dead_loads import add_dead_load
+from ufl_beam.quadrature import gauss_rule
+from ufl_beam.terms.dead_loads import add_dead_load, loaded_cells
 from ufl_beam.terms.energy_ledger import Energy
 
 LEAST_ROWS, MOST_VALUES = 8, 2**17
@@ -110,7 +111,7 @@ class Cells:
         return cell_axes(self.fields)
 
     @cached_property
-    def loads_in_space(self) -> list[tuple[Any, Array]]:
+    def dead_loads(self) -> list[tuple[Any, Array]]:
         """Dead loads along beams in space, and their forces on nodes of cells; (n, 2, 3); N."""
         found, none = list[tuple[Any, Array]](), np.zeros(self.numbering.size)
         for load in self.numbering.scene.loads:
@@ -120,6 +121,36 @@ class Cells:
                 if some is not None:
                     along[some[0]] = some[1].reshape(-1, 6, 2)
                 found.append((load, along[:, :3].transpose(0, 2, 1)))
+        return found
+
+    def loads_in_space(self, t: float, q: Array, state: CellsOfState) -> Array:
+        """Return the forces of loads along cells on their nodes, without inertia; (n, 2, 3); N."""
+        numbering, subdomain = self.numbering, self.fields.subdomain
+        found: Array = np.zeros((len(numbering.cells), 2, 3))
+        for load, forces in self.dead_loads:
+            found += value_at(load.amplitude, t, load) * forces
+        for load in numbering.scene.loads:
+            if isinstance(load, Pressure | MovingLoad):
+                factor = value_at(load.amplitude, t, load)
+            if isinstance(load, Pressure):
+                (cells, profile), (s, weights) = loaded_cells(load, subdomain), gauss_rule(4)
+                shares = factor * profile @ (weights * [1 - s, s]).T
+                force = state.forces_on_axis((load.tangential, *np.broadcast_to(load.normal, 2)))
+                found[cells] += shares[:, :, None] * force[cells, None]
+            elif isinstance(load, RotatingFrame):
+                moved = numbering.points + q[numbering.dofs[: len(numbering.points), :3]]
+                arms = moved[numbering.cells] - (*load.about, 0.0)[:3]
+                masses = state.lengths * self.fields.section_values("rhoA")[:, 0]
+                accelerations = -np.cross(load.rate, np.cross(load.rate, arms))
+                found += masses[:, None, None] * ((1 + np.eye(2)) / 6 @ accelerations)
+            elif isinstance(load, MovingLoad):
+                cells = np.concatenate([numbering.cells_of(beam) for beam in load.route])
+                ends = np.append(0.0, np.cumsum(numbering.lengths(cells)))
+                distance = value_at(load.position, t, load)
+                if 0.0 <= distance <= ends[-1]:
+                    k = max(int(np.searchsorted(ends, distance)) - 1, 0)
+                    s = (distance - ends[k]) / (ends[k + 1] - ends[k])
+                    found[cells[k]] += factor * np.outer((1 - s, s), (*load.force, 0.0)[:3])
         return found
 
     @cached_property
@@ -529,12 +560,14 @@ class States:
         return self._computed[1]
 
     def _in_cells_of_space(self, n: int, pieces: Array, in_scene: bool = False) -> Array:
-        """Compute section forces of strains of a state, and of dead loads along cells."""
-        t, cells = float(self._row("t", n)), self.cells_in_space(n)
-        along: Array = np.zeros((len(cells.lengths), 2, 3))
+        """Compute section forces of strains of a state, and of loads along cells."""
+        t, q, cells = float(self._row("t", n)), self._row("q", n), self.cells_in_space(n)
         # The undeformed scene has no section forces, as in the plane.
-        for load, on_nodes in self.cells.loads_in_space if self._row("q", n).any() else ():
-            along += value_at(load.amplitude, t, load) * on_nodes
+        along = (
+            self.cells.loads_in_space(t, q, cells)
+            if q.any()
+            else np.zeros((len(cells.lengths), 2, 3))
+        )
         resultants = self.forces_in_middle(n)
         return cells.section_forces(pieces, resultants, along, in_scene=in_scene)
 
@@ -609,7 +642,7 @@ class States:
         With ``start=`` and the same scheme, a run begins with the last forces of the earlier run.
         Other static runs begin without section forces, other dynamic runs with stresses only.
 
-        In space, section forces are those of the strains of the state, with dead loads along the
+        In space, section forces are those of the strains of the state, with all loads along the
         beam.  They are in equilibrium with all forces of statics.  Inertia within a cell is left
         out, so that V and N at the ends of cells have errors of first order in their length.
 

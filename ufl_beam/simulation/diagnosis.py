@@ -14,7 +14,7 @@ from scipy.sparse import csr_array, diags_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.cell_functions import strains_of
-from ufl_beam.discretization.cells_in_space import by_rotation, rotations_between
+from ufl_beam.discretization.cells_in_space import rotations_between
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -26,7 +26,6 @@ from ufl_beam.errors import (
     StepFailed,
     warn,
 )
-from ufl_beam.mechanics.spatial_motions import ABOUT_AXIS
 from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, loss_must_grow
 from ufl_beam.model.connector_laws import Coulomb, Damper, ForceLaw, RigidPlastic, Spring, Stop
@@ -73,8 +72,8 @@ step, the smallest substep, gives 1/64; a tenth allows for larger distances."""
 LEDGER_TOLERANCE = 10.0
 """Largest relative imbalance of a ledger that should be exact, as a multiple of ``Newton.rtol``."""
 
-BENT_FAR, NEAR_FULL_TURN = np.pi / 2, 1.9 * np.pi
-"""Rotations in space from which on an error of a run names a cell, or a connector; rad."""
+BENT_FAR = np.pi / 2
+"""Rotations in space from which on an error of a run names a cell; rad."""
 
 NAMED = 3  # largest number of names that a message lists
 
@@ -128,10 +127,15 @@ def no_equilibrium(
         if not why and probe is not q0 and equation.evaluate(probe):
             why = _singularity(equation, probe)
         why = why or _limit_point(equation, solution, q0, probe)
+    known = {
+        "guided": "no nearest point was found on its guide curve",
+        "turning": "in space it turns by 360° about an axis that is not its own, where the "
+        "rotation vector has no direction",
+    }
     lost = [
-        f"{c.b}: no nearest point was found on its guide curve"
+        f"{c.b if c.motion == 'guided' else c}: {known[c.motion]}"
         for c in equation.subdomain.numbering.scene.all_connectors
-        if c.motion == "guided" and np.isnan(failure.residuals.get(f"force of {c}", 0.0))
+        if c.motion in known and not np.isfinite(failure.residuals.get(f"force of {c}", 0.0))
     ]
     reasons = [*lost, why, f"{failure} ({sizes})" if sizes else str(failure)]
     if isinstance(failure, Reversal):
@@ -144,20 +148,9 @@ def no_equilibrium(
 
 
 def turned_far(now: States) -> str:
-    """Return advice on a hinge, cell or connector in space that has turned too far, or nothing."""
+    """Return advice on a hinge or cell in space that has turned too far, or nothing."""
     numbering, turns = now.numbering, now.turns(0)
-    at_dofs, cells = by_rotation(numbering, turns), numbering.cells
-    for connector in (x for x in now.scene.all_connectors if x.motion == "turning"):
-        ends = (at_dofs[[numbering.node(place)[3]]] for place in (connector.a, connector.b))
-        vector = rotations_between(*ends)[0]
-        is_about_axis = np.hypot.reduce(np.cross(vector, connector.axis)) < BENT_FAR * ABOUT_AXIS
-        if not is_about_axis and (angle := np.hypot.reduce(vector)) > NEAR_FULL_TURN:
-            return (
-                f"The places of {connector} have turned by {np.degrees(angle):.0f}°, and not only "
-                "about its axis, so that it measures rotations below 360°; let joints or supports "
-                "hold the other rotations"
-            )
-    first, second = turns[cells.T]
+    first, second = turns[numbering.cells.T]
     angles = np.linalg.norm(rotations_between(first, second), axis=1)
     if max(angles, default=0.0) < BENT_FAR:
         return ""

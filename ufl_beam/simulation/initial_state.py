@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -156,10 +157,10 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
     owners = [numbering.middle(int(cell)).beam.name for cell in numbering.inelastic_cells[:1]]
     owners += [str(c) for c in scene.all_connectors if remembers(c.law)]
     owners += [str(x) for x in scene.works if isinstance(x, Effect) and x.statement.state]
-    if scene.in_space:  # quaternions do not tell further turns
-        motions = solution.column("connectors")[:,][n, :, 0]
-        pairs = zip(scene.all_connectors, motions, strict=True)
-        owners += [str(c) for c, e in pairs if c.motion == "turning" and abs(e) > 2 * np.pi]
+    if scene.in_space:  # whole turns
+        motions = solution.column("connectors")[:, :, 0][n]
+        owners += [str(scene.all_connectors[i]) for i in np.flatnonzero(np.abs(motions) > math.pi)
+                   if scene.all_connectors[i].is_rotation]  # fmt: skip
     if owners:
         raise ArgumentError(
             f"{what}: {owners[0]} has internal variables, and solutions have those of the end of a "

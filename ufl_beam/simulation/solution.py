@@ -222,6 +222,8 @@ class Solution(States, Rich):
     def acceleration(self, place: AttachmentPoint) -> Array:
         """Return the mean acceleration of a place in each step; (n+1, 3); m/s², m/s², rad/s².
 
+        In space, return it along x, y, z, and about axes of the node; (n+1, 6).
+
         It is the change of the velocity since the previous stored time, divided by the time between
         both, and is exact to second order in the middle of this interval.  In midpoint schemes
         :meth:`reaction` and section forces of the same row are in equilibrium with it, but not at
@@ -239,7 +241,7 @@ class Solution(States, Rich):
         if not len(self.column("v")):
             raise ArgumentError("acceleration: the run was static; there is none")
         change = np.diff(self.velocity(place), axis=0) / np.diff(self.times)[:, None]
-        return np.concatenate([np.full((1, 3), math.nan), change])
+        return np.concatenate([np.full_like(change[:1], math.nan), change])
 
     def variables(self, beam: Member) -> dict[str, Array]:
         """Return the internal variables of a beam at the end of the run, by the names of its laws.

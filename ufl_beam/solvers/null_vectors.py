@@ -43,7 +43,7 @@ def soft_motions(equation: Any) -> tuple[csc_array, Index, Array, Array] | None:
         or not finite.
     """
     K, free = free_tangent(equation)
-    if not len(free) or not np.isfinite(K.data).all():
+    if not K.data.any() or not np.isfinite(K.data).all():
         return None
     try:
         return K, free, *null_vectors(K)
