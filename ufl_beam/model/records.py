@@ -35,9 +35,9 @@ from ufl_beam.errors import (
     require_text,
     require_vector,
 )
-from ufl_beam.model.functions import TimeFunction, require_time_function
 
 T = TypeVar("T")
+TimeFunction = Callable[[float], float]
 
 Number = Annotated[float, require_number]
 Positive = Annotated[float, partial(require_number, positive=True)]
@@ -135,9 +135,14 @@ class Record:
         return () if place is None else (place,)
 
     def functions_of_time(self) -> Iterable[TimeFunction]:
-        """Return the functions of time of the record, by default all fields of type ``Timed``."""
-        checks = _checks(type(self))  # type: ignore[arg-type]
-        return [getattr(self, x) for x, *_, check in checks if check is require_time_function]
+        """Return the functions of time of the record, by default its fields of this type."""
+        return [getattr(self, name) for name in _timed(type(self))]  # type: ignore[arg-type]
+
+
+@cache
+def _timed(record: type[Any]) -> list[str]:
+    """Return the names of the fields with a function of time."""
+    return [n for n, kind in get_type_hints(record).items() if kind == TimeFunction]
 
 
 @cache

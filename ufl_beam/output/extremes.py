@@ -231,7 +231,7 @@ class Extremes(Restartable):
         self._accelerated = bool(accelerations)
         self._fractions = np.arange(int(points)) / (int(points) - 1)
         self._in_c: Any = None  # ExtremesInC during a run
-        self._taken: list[Extent] = []
+        self._taken: dict[str, Extent] = {}  # by quantity
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin with the initial state, or continue from a :meth:`state`."""
@@ -241,30 +241,27 @@ class Extremes(Restartable):
             raise ArgumentError("Extremes: accelerations: the run is static; there are none")
         in_space, size = simulation.scene.in_space, self._numbering.size
         self.by_itself = simulation.subdomain.alone and not self._accelerated and not in_space
-        forces = 6 if in_space else 3
-        shapes = (len(self._numbering.cells), len(self._fractions), forces), (size,), (size,)
-        self._taken = []
-        for what, shape in zip(self._names, shapes, strict=False):
+        along = len(self._numbering.cells), len(self._fractions), 6 if in_space else 3
+        shapes: dict[str, tuple[int, ...]] = {"forces": along, "q": (size,)}
+        shapes |= {"a": (size,)} if self._accelerated else {}
+        self._taken = {}
+        for what, shape in shapes.items():
             extent = Extent(*(np.full(shape, x) for x in (np.inf, -np.inf, 0.0, 0.0)))
             if state is not None:
                 names = [f"{what} {name}" for name in Extent._fields]
                 require_arrays(state, dict.fromkeys(names, shape))
                 extent = Extent(*(state[name].copy() for name in names))
-            self._taken.append(extent)
+            self._taken[what] = extent
         if not in_space:
             self._in_c = simulation.watch(self._fractions)
-            self._in_c.begin(-1 if state is None else simulation.substeps, *self._taken[:2])
+            steps = -1 if state is None else simulation.substeps
+            self._in_c.begin(steps, self._taken["forces"], self._taken["q"])
         self._before: Array = np.full((1 + size) * self._accelerated, np.nan)
         if state is None:
             self.write(simulation)
         elif self._accelerated:
             require_arrays(state, {"before": self._before.shape})
             self._before = state["before"].copy()
-
-    @property
-    def _names(self) -> tuple[str, ...]:
-        """Names of the recorded quantities in a :meth:`state`."""
-        return ("forces", "q", *(("a",) if self._accelerated else ()))
 
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
@@ -274,8 +271,8 @@ class Extremes(Restartable):
             motion[numbering.dofs] = now.motion_of_nodes(0)
             for body, dofs in zip(simulation.scene.bodies, numbering.dofs_of_bodies, strict=False):
                 motion[dofs] = now.displacement(body.middle)[0]
-            self._widen(0, now.cell_forces(0, self._fractions), simulation.t)
-            self._widen(1, motion, simulation.t)
+            self._widen("forces", now.cell_forces(0, self._fractions), simulation.t)
+            self._widen("q", motion, simulation.t)
         else:
             self._in_c.add(simulation.substeps, simulation.t, simulation.q, simulation.q_before)
         if self._accelerated:
@@ -283,9 +280,9 @@ class Extremes(Restartable):
             latest = np.append(simulation.t, v)
             change = latest - self._before
             self._before[:] = latest
-            self._widen(2, change[1:] / change[0], simulation.t)
+            self._widen("a", change[1:] / change[0], simulation.t)
 
-    def _widen(self, quantity: int, values: Array, t: float) -> None:
+    def _widen(self, quantity: str, values: Array, t: float) -> None:
         """Extend the extremes of a quantity by its values at the time ``t``."""
         extent = self._taken[quantity]
         for reached, when, beyond in (
@@ -301,17 +298,15 @@ class Extremes(Restartable):
         self._taken, self._in_c = self._extents, None
 
     @property
-    def _extents(self) -> list[Extent]:
+    def _extents(self) -> dict[str, Extent]:
         """Extremes of forces, of motions and, if they are recorded, of accelerations."""
-        return self._taken if self._in_c is None else [*self._in_c.extents(), *self._taken[2:]]
+        in_c = self._in_c.extents() if self._in_c is not None else ()
+        return self._taken | dict(zip(("forces", "q"), in_c, strict=False))
 
     def state(self) -> State:
         """Return the extremes so far, by name."""
-        extents = zip(self._names, self._extents, strict=True)
-        more = {"before": self._before} if self._accelerated else {}
-        return more | {
-            f"{k} {name}": x for k, extent in extents for name, x in extent._asdict().items()
-        }
+        more, extents = {"before": self._before} if self._accelerated else {}, self._extents.items()
+        return more | {f"{k} {n}": x for k, extent in extents for n, x in extent._asdict().items()}
 
     @property
     def numbering(self) -> DofNumbering:
@@ -344,7 +339,7 @@ class Extremes(Restartable):
             ArgumentError: The beam is not in the scene, or nothing was run.
         """
         cells = self.numbering.cells_of(beam)
-        found = self._extents[0].subset(cells)
+        found = self._extents["forces"].subset(cells)
         return Extent(*(x.reshape(-1, x.shape[2]) for x in found))
 
     def displacement(self, owner: Member | Body) -> Extent:
@@ -358,7 +353,7 @@ class Extremes(Restartable):
         Raises:
             ArgumentError: The object is not in the scene, or nothing was run.
         """
-        return self._at_nodes(1, owner)
+        return self._at_nodes("q", owner)
 
     def acceleration(self, owner: Member | Body) -> Extent:
         """Return extremes of mean accelerations of steps; (n, 3); m/s², m/s², rad/s².
@@ -381,9 +376,9 @@ class Extremes(Restartable):
             raise ArgumentError(
                 "Extremes: accelerations are not recorded; use Extremes(accelerations=True)"
             )
-        return self._at_nodes(2, owner)
+        return self._at_nodes("a", owner)
 
-    def _at_nodes(self, quantity: int, owner: Member | Body) -> Extent:
+    def _at_nodes(self, quantity: str, owner: Member | Body) -> Extent:
         """Return the extremes of a quantity at the nodes of a beam or body; (n, 3)."""
         numbering = self.numbering
         if isinstance(owner, Body):

@@ -350,13 +350,11 @@ def _name_bodies(drawing: Drawing) -> None:
 def _write_connector(drawing: Drawing, connector: Connector) -> None:
     """Write the name and the parameters of a connector."""
     offsets, unit = drawing.shape.canvas.offsets, drawing.unit
-    offset, (a, b) = offsets[connector], symbols.connector_ends(drawing.shape, connector)
+    offset, (a, b, across) = offsets[connector], symbols.connector_frame(drawing.shape, connector)
     if connector.is_rotation:
         spots = around(b, radius=(1.6 + offset + 0.8) * unit)
     else:
-        apart = math.dist(a, b) > 0.1 * unit
-        across = normal(unit_vectors(b - a) if apart else np.array(connector.axis))
-        side, lane = math.copysign(1.0, offset) * across, a + offset * unit * across
+        side, lane = math.copysign(1.0 / unit, offset) * across, a + offset * across
         ends = {connector.a, connector.b}
         same = [offsets[c] for c in drawing.scene.connectors if {c.a, c.b} == ends]
         if offset in (min(same), max(same)):

@@ -466,32 +466,31 @@ def connectors(shape: DeformedShape) -> Iterator[Stroke]:
         yield from (disc(at, 0.3 * shape.canvas.unit, INK, GREY) for at in points)
 
 
-def connector_ends(shape: DeformedShape, connector: Connector) -> tuple[Array, Array]:
-    """Return the start and end of the drawing of a straight connector; (2,) or (3,) each; m.
+def connector_frame(shape: DeformedShape, connector: Connector) -> tuple[Array, Array, Array]:
+    """Return start and end of the drawing of a straight connector, and a unit across it; m.
 
     A sliding connector is drawn along its axis and ends at the projection of its place b onto the
     axis.  It begins before a if it would otherwise be too short in the undeformed scene.
     """
-    a, b = shape.at(connector.a), shape.at(connector.b)
-    if not connector.follows_a:
-        return a, b
-    ahead = shape.turned(connector.axis, connector.a)
-    start = float(np.dot(connector.apart, connector.axis))
-    least = math.copysign(max(LEAST_SLIDE * shape.canvas.unit, abs(start)), start)
-    return a - (least - start) * ahead, a + ((b - a) @ ahead) * ahead
+    a, b, unit = shape.at(connector.a), shape.at(connector.b), shape.canvas.unit
+    if connector.follows_a:
+        ahead = shape.turned(connector.axis, connector.a)
+        start = float(np.dot(connector.apart, connector.axis))
+        least = math.copysign(max(LEAST_SLIDE * unit, abs(start)), start)
+        a, b = a - (least - start) * ahead, a + ((b - a) @ ahead) * ahead
+    apart = np.linalg.norm(b - a) > 0.1 * unit
+    axis = unit_vectors(b - a) if apart else shape.turned(connector.axis, connector.a)
+    return a, b, unit * normal(axis)
 
 
 def _straight(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
-    a, b = connector_ends(shape, connector)
+    a, b, across = connector_frame(shape, connector)
     unit, offset = shape.canvas.unit, shape.canvas.offsets[connector]
     length = math.hypot(*connector.apart)
     if connector.follows_a:
         yield Stroke(np.array([b, shape.at(connector.b)]), STEEL, 1.0)
         along_axis = abs(float(np.dot(connector.apart, connector.axis)))
         length = max(along_axis, LEAST_SLIDE * unit)
-    apart = np.linalg.norm(b - a) > 0.1 * unit
-    axis = unit_vectors(b - a) if apart else shape.turned(connector.axis, connector.a)
-    across = unit * normal(axis)
     if offset:
         for end, far in ((a, b), (b, a)):
             lane = end + 0.06 * (far - end)
