@@ -149,7 +149,7 @@ def simulate(
     if isinstance(scene, Scene):
         warn_of_loads(scene, (t0, t1))
         if not isinstance(dt, Adaptive):
-            ends = np.linspace(t0, t1, step_count(t1 - t0, dt) + 1)
+            ends = np.linspace(t0, t1, step_count(t1 - t0, dt) + 1, dtype=np.float64)
             warn_of_tables(scene, ends, dynamic=has_inertia(scheme))
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")
