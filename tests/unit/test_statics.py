@@ -218,6 +218,19 @@ def test_a_shallow_truss_is_refused_at_its_limit_load(scale):
         assert "constant loads act in the first step, give them amplitude=" in str(ended.value)
 
 
+@pytest.mark.parametrize(("push", "steps"), [(1e-3, 100), (1e-2, 20)])
+def test_a_bent_column_does_not_leap_to_the_straight_one(push, steps):
+    """Energies agree with works there, too, but a growing load does work by its growth."""
+    column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e4, GA=4e3, EI=1.0), cells=10)
+    down = ub.PointLoad(column.end, force=(0, -3.0), amplitude=lambda t: t)
+    scene = clamped(column, loads=[down, ub.PointLoad(column.end, force=(push, 0))])
+    found = run(scene, ub.Static(), t=(0, 1), dt=1 / steps)
+    sways = found.displacement(column.end)[:, 0]
+    assert (np.diff(sways) > 0).all()
+    assert sways[-1] > 0.6
+    assert found.substeps > steps
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.37, 2.2, 4.0])
 def test_a_pendulum_hangs_in_any_direction(angle):
     """The first tangent is singular to round-off, which is no less a mechanism than zero."""
