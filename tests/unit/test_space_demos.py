@@ -37,7 +37,7 @@ LEFT_OUT = {
 SHORT = {
     "adaptive_steps": {"dt": 4e-3, "steps": 150},
     "calibration": {},
-    "concrete_column": {"steps": 8},  # later cracks open in other rounds of iterations
+    "concrete_column": {"steps": 8},  # the next is divided or not by last digits, in both
     "emergency_stop": {"dt": 5e-3, "steps": 150},
     "end_rotation": {},
     "fatigue": {},

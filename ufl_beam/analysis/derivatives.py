@@ -677,6 +677,8 @@ class Derivatives:
 
     def _fraction(self, name: str) -> float:
         """Return the relative step of a parameter between runs, which do not reach a switch."""
+        # Rotations of such runs in space have the round-off of the products of all steps
+        widest = MODEL_STEP if self.solution.scene.in_space else QUANTITY_STEP
         switch = self.ranges[name].change / (abs(self.at[name]) or 1.0)
         if switch < FARTHEST * LEAST_STEP:
             warn(
@@ -685,7 +687,7 @@ class Derivatives:
                 "if it matters. Choose another value, or compare with runs"
             )
             return QUANTITY_STEP
-        return min(QUANTITY_STEP, switch / FARTHEST)
+        return min(widest, switch / FARTHEST)
 
     def _runs(self, p: int, fraction: float) -> list[Solution]:
         """Return whole solutions at values of parameter p, in steps of a fraction of it."""
