@@ -267,8 +267,9 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
     connectors, left = np.zeros(len(scene.all_connectors)), np.ones(len(scene.all_connectors))
     for group in equation.connector_terms:
         after, before = map(group.motion, ends)
-        change = (after - before) / (2 * ε)
-        connectors[group.indices] = np.abs(np.nan_to_num(change))  # not a number: end of a guide
+        known = np.isfinite(after) & np.isfinite(before)  # no end of a guide or of a rotation
+        change = np.subtract(after, before, out=np.zeros_like(after), where=known) / (2 * ε)
+        connectors[group.indices] = np.abs(change)
         left[group.indices] = group.remaining()
         if isinstance(group.law, RigidPlastic):
             # A held connector cannot move, so one that moves slips in the latest tangent.
