@@ -472,3 +472,13 @@ def test_an_option_of_another_linear_solver_is_refused():
     with raises("ub_pc_factor_mat_ordering_type"):
         run(newton=ub.Newton(petsc={"pc_factor_mat_ordering_type": "rcm"}))
     run(newton=ub.Newton(petsc={"ksp_type": "richardson", "ksp_richardson_scale": 1.0}))
+
+
+@pytest.mark.parametrize("t", [0.5, 0.4, math.nan])
+def test_steps_end_later_than_the_present_time(t):
+    simulation = ub.Simulation(scene(supports=[ub.Clamped(GIRDER.start)]), ub.Static(), t0=0.5)
+    with pytest.raises(
+        ub.ArgumentError, match=r"step_to\(.*the simulation is at t = 0.5 s already"
+    ):
+        simulation.step_to(t)
+    simulation.close()

@@ -145,8 +145,8 @@ BY_NAME = {
     **alike(False, SWITCH, "anew beyond centroid_only lumped multipliers progress reference "
         "tangent turning"),
     **alike((1, 0), EITHER, "acceleration center force linear point"),
-    **alike(None, optional(POSITIVE), "GA3 EI2 GJ rhoI2 shear_factor3"),
-    "angles": ((1, 0), VECTOR), "up": (None, UP),
+    **alike(None, optional(POSITIVE), "GA3 EI2 GJ shear_factor3"),
+    "angles": ((1, 0), VECTOR), "up": (None, UP), "rhoI2": (None, optional(FROM_ZERO)),
     "torsion": (None, optional([*POSITIVE, 10.0])),
     **alike(BEAM.end, NO_PLACE, "place rail"), **alike(OTHER.end, NO_PLACE, "slider"),
     **alike(lambda t: t, [*TIME, None], "amplitude motion position"),

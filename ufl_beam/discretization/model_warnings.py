@@ -104,17 +104,17 @@ def warn_of_loads(scene: Scene, t: tuple[float, float]) -> None:
             )
 
 
-def warn_of_tables(scene: Scene, ends: Array, *, dynamic: bool) -> None:
-    """Warn of tables whose values change within steps with the given ends; s.
+def warn_of_tables(scene: Scene, ends: Array) -> None:
+    """Warn of tables whose values change within steps of dynamics with the given ends; s.
 
-    Dynamics takes loads in the middle of a step, so that the impulse of a short pulse may be lost.
-    Other values are taken at the ends of steps, which may leave out the extremes.
+    Loads are taken in the middle of a step, so that the impulse of a short pulse may be lost.
+    Motions are taken at the ends of steps, which may leave out the extremes.
     """
     for owner, function in scene.time_functions():
         if not isinstance(function, Table):
             continue
         times, values = (np.array(x, dtype=float) for x in (function.times, function.values))
-        of_impulse = dynamic and function is getattr(owner, "amplitude", None)
+        of_impulse = function is getattr(owner, "amplitude", None)
         if of_impulse:
             if np.diff(times).min(initial=math.inf) > 0.999 * (ends[1] - ends[0]):
                 continue  # a step has two of the times at most
@@ -134,8 +134,8 @@ def warn_of_tables(scene: Scene, ends: Array, *, dynamic: bool) -> None:
             warn(
                 f"{owner}: its Table changes within steps of {ends[1] - ends[0]:.4g} s, so that "
                 + (f"impulses are wrong by {error}" if of_impulse else f"{error} of it are missed")
-                + ". Give a dt that divides the intervals between its times"
-                + (", or dt=Adaptive(...), whose steps end there" if dynamic else "")
+                + ". Give a dt that divides the intervals between its times, or dt=Adaptive(...), "
+                "whose steps end there"
             )
 
 

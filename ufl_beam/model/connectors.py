@@ -196,7 +196,7 @@ class Turn(Connector):
     def __post_init__(self) -> None:
         super().__post_init__()
         in_space = len(self.a.point) == 3
-        if in_space == (self.axis is None or np.array_equal(self.axis, Turn.axis)):
+        if self.axis is None or in_space == np.array_equal(self.axis, Turn.axis):
             raise ModelError(f"{self}: in space give axis=(x, y, z); in the plane there is none")
         if in_space:
             object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Turn"))

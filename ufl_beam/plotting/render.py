@@ -441,8 +441,9 @@ class Solids:
         (self._add_in_space if self.in_space else self._add)(n, shape, meshes, lines)
         for (color, weight), several in lines.items():
             radius = weight * shape.canvas.unit / 20.0
-            meshes[color].append(_lines(several).tube(radius=radius, n_sides=12))
-        return meshes
+            rod = _lines(several).tube(radius=radius, n_sides=12)
+            meshes[color] += [rod] if rod.n_points else []
+        return {color: some for color, some in meshes.items() if some}
 
     def _add(self, n: int, shape: DeformedShape, meshes: Meshes, lines: Lines) -> None:
         """Add blocks and lines of a scene in the plane."""

@@ -142,9 +142,9 @@ def simulate(
         )
     if isinstance(scene, Scene):
         warn_of_loads(scene, (t0, t1))
-        if not isinstance(dt, Adaptive):
+        if has_inertia(scheme) and not isinstance(dt, Adaptive):
             ends = np.linspace(t0, t1, step_count(t1 - t0, dt) + 1, dtype=np.float64)
-            warn_of_tables(scene, ends, dynamic=has_inertia(scheme))
+            warn_of_tables(scene, ends)
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")
     start = chosen_state(start, "start")

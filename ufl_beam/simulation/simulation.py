@@ -238,8 +238,13 @@ class Simulation(Stepper):
         Raises:
             ConvergenceError: Even the smallest substep failed.  The present state is then the end
                 of the last accepted substep, as is the last state of ``error.solution``.
-            ArgumentError: Loads of the first static step do not resist a motion without strain.
+            ArgumentError: Loads of the first static step do not resist a motion without strain, or
+                ``t1`` is not later than the present time.
         """
+        if not t1 > self.t:
+            raise ArgumentError(
+                f"step_to({t1}): the simulation is at {self.parameter.at(self.t)} already"
+            )
         self.steps_to(np.array([t1]))
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:

@@ -537,8 +537,10 @@ class StaticPath:
             supports.commit()
         changes = [phases.change for phases in equation.phases if phases.change is not None]
         accounts = ledger.state, ledger.supplied, ledger.lost
+        of_dead_loads = all(isinstance(load, DeadLoads) for load in equation.loads)
+        dead = of_dead_loads and not (supports.work or len(subdomain.numbering.multipliers))
         self.c = struct(
-            "static_path", slack=scheme.slack, far=LARGEST_MOTION, kink=KINK_IMBALANCE,
+            "static_path", slack=scheme.slack, far=LARGEST_MOTION, kink=KINK_IMBALANCE, dead=dead,
             per_far=subdomain.numbering.scales[subdomain.dofs],
             force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
             change=ffi.new("change_call[]", changes), accounts=len(accounts),

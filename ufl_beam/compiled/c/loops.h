@@ -781,6 +781,7 @@ typedef struct {
   double slack, far, kink;
   const double *per_far; /* 1 / size of the scene for displacements, 1 for rotations */
   double *force, weight_of_before; /* internal forces before the step */
+  int dead; /* whether only dead loads act, supports rest, and there are no connectors */
   int terms;
   const change_call *change;
   int accounts; /* arrays of the ledger */

@@ -358,7 +358,7 @@ static int stiffens(time_loop *m)
 
 /* Check that a static step has followed its path: no node moves as a mechanism does, the work of
  * internal forces equals the energy stored and dissipated, see step_equation.py, and loads do work on
- * the motion by their growth, as in stable states of elastic scenes whose supports rest. */
+ * the motion by their growth, as in stable states of elastic scenes with dead loads only. */
 static int followed(time_loop *m)
 {
   static_path *p = m->path;
@@ -378,10 +378,10 @@ static int followed(time_loop *m)
   for (int i = 0; i < m->size; ++i) second += (e->inner_force[i] - p->force[i]) * m->s[i];
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
-  enum { OF_FORCES, BEAMS, CONNECTORS, EFFORT, ROUND_OFF, THROUGH, SECOND, MOVING, INNER, MOVES, SUMS };
-  const enum agreement how[SUMS] = {TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, HYPOT, HYPOT};
+  enum { OF_FORCES, BEAMS, CONNECTORS, EFFORT, ROUND_OFF, THROUGH, SECOND, INNER, MOVES, SUMS };
+  const enum agreement how[SUMS] = {TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, HYPOT, HYPOT};
   const double moves = norm(e->owned, 0, p->per_far, m->s);
-  double of[SUMS] = {work, sum.in_beams, sum.in_connectors, sum.effort, round_off, through, second, m->supports->moving, e->inner_size, moves};
+  double of[SUMS] = {work, sum.in_beams, sum.in_connectors, sum.effort, round_off, through, second, e->inner_size, moves};
   agree(e, SUMS, how, of);
   p->work = of[OF_FORCES];
   p->stored = of[BEAMS] + of[CONNECTORS];
@@ -397,7 +397,7 @@ static int followed(time_loop *m)
    * In shorter steps that energy vanishes with the square of the step, and the energy of a leap does
    * not. */
   const int elastic = of[EFFORT] + fabs(of[CONNECTORS]) <= p->slack * fabs(of[BEAMS]);
-  const int leaps = elastic && !e->border && of[MOVING] == 0 && of[SECOND] < -(left + of[ROUND_OFF]);
+  const int leaps = elastic && p->dead && !e->border && of[SECOND] < -(left + of[ROUND_OFF]);
   if (!leaps && fabs(p->work - p->stored) <= slack + p->kink * (of[THROUGH] + p->rejected)) return 1;
   /* Between both ends the forces of connectors are not those of their laws. */
   const int one_branch = !m->opens && !e->border && over_processes(e, LARGEST, e->again.number) == 0;
