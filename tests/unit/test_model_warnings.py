@@ -356,6 +356,7 @@ def test_tables_that_change_within_steps():
     ub.simulate(shaken, ub.EnergyMomentum(), t=(0, 1), dt=0.25)
 
 
+@pytest.mark.serial  # scenes that processes share are not examined
 @pytest.mark.parametrize("push", [0.0, 1.0])
 def test_an_unstable_equilibrium(push):
     """[closed] A column of 100 N m² and 1 m, shortened by 2 %: EA bears 20 times Euler's load."""

@@ -127,6 +127,7 @@ def test_a_free_hinge_turns_by_more_than_half_a_turn(steps):
     assert np.allclose(run.energy["loads"][-1], 9.0**2 / 2 * (1 / 2.0 + 1 / 10.0), rtol=1e-9)
 
 
+@pytest.mark.serial  # it reads the forces of local degrees of freedom
 def test_forces_on_a_rope_that_stiffens_and_turns_its_end():
     """[closed] A force on the middle of a straight rope, a moment on its end, and a weak spring.
 
