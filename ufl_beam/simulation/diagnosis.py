@@ -114,7 +114,8 @@ def no_equilibrium(
         except Exception:
             vectors[term.kind].fill(np.nan)  # the exception is why the step has failed
     forces = {kind: size for kind, force in vectors.items() if (size := newton.size(force))}
-    sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
+    finite = ((kind, size) for kind, size in forces.items() if np.isfinite(size))
+    sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in finite)
     where = f"at {named.at(t, '.9g')}"
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.step.format(end - t)}"
