@@ -330,7 +330,7 @@ class JointHistory(NamedTuple):
         moment: Moment of the joint on b, about the place b; (n+1,), in space along x, y, z,
             (n+1, 3); N m.  If the places share their rotation, the moment is unknown: NaN.  In
             energy-momentum schemes it is a mean of the step.  In the plane its work on the change
-            of the rotation is that of the step; in space its impulse is that of the step.
+            of the rotation is the work of the step; in space its impulse is exact.
     """
 
     motion: Array

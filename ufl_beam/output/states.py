@@ -642,8 +642,8 @@ class States:
         With ``start=`` and the same scheme, a run begins with the last forces of the earlier run.
         Other static runs begin without section forces, other dynamic runs with stresses only.
 
-        In space, section forces are those of the strains of the state, with all loads along the
-        beam.  They are in equilibrium with all forces of statics.  Inertia within a cell is left
+        In space, section forces follow from the strains of the state and all loads along the beam.
+        They are in equilibrium with all forces of statics.  Inertia within a cell is left
         out, so that V and N at the ends of cells have errors of first order in their length.
 
         Raises:

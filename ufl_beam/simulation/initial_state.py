@@ -163,8 +163,8 @@ def chosen_state(given: StateOf | None, what: str) -> Solution | None:
                    if scene.all_connectors[i].is_rotation]  # fmt: skip
     if owners:
         raise ArgumentError(
-            f"{what}: {owners[0]} has internal variables, and solutions have those of the end of a "
-            f"run only; end a run at {solution.parameter.at(solution.times[n])}, or call end() or "
+            f"{what}: {owners[0]} has internal variables, which solutions keep at the end of a run "
+            f"only; end a run at {solution.parameter.at(solution.times[n])}, or call end() or "
             "snapshot() of a Simulation there"
         )
     part = type(solution)(scene, numbering, solution)

@@ -63,8 +63,8 @@ def spectral_accelerations(spectrum: Any, periods: Array, what: str) -> Array:
         T, a = (require_row(x, f"{what}: spectrum") for x in (T, a))
         if len(T) != len(a) or not (np.diff(T) > 0).all():
             raise ArgumentError(
-                f"{what}: the spectrum has {len(T)} periods and {len(a)} accelerations; it needs "
-                "as many of each, and periods must increase"
+                f"{what}: the spectrum has {len(T)} periods and {len(a)} accelerations; their "
+                "numbers must be equal, and periods must increase"
             )
         outside = (periods < T[0] * (1 - ROUND_OFF)) | (periods > T[-1] * (1 + ROUND_OFF))
         if outside.any():
