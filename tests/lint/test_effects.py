@@ -243,7 +243,7 @@ def options():
                 yield name, field.name, default
 
 
-@pytest.mark.parametrize(("name", "option", "default"), options())
+@pytest.mark.parametrize(("name", "option", "default"), [*options()])
 def test_each_option_is_in_a_scene(name, option, default):
     """With another value than its default; of a switch without default both values."""
     values = values_of_fields()[name, option]

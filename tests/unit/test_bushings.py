@@ -113,7 +113,7 @@ def test_tangent_is_the_derivative(name, scheme):
 
 
 @pytest.mark.parametrize(
-    ("name", "scheme"), zip([*LAWS, "creeping", "hole"], SCHEMES, strict=True), ids=str
+    ("name", "scheme"), [*zip([*LAWS, "creeping", "hole"], SCHEMES, strict=True)], ids=str
 )
 def test_the_reference_finds_the_same(name, scheme, as_by_reference):
     """The ledger of exact schemes closes, also where a step passes the edge of a hole."""
