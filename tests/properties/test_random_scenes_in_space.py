@@ -10,7 +10,6 @@ import sys
 import tempfile
 import traceback
 import warnings
-from itertools import pairwise
 from pathlib import Path
 
 from mpi4py import MPI
@@ -33,6 +32,9 @@ FAR = "The hinge in a cell", "A cell, ", "The places of Turn"
 
 ENDS = "a mechanism has formed", "a limit load or a bifurcation is near", *FAR
 """Reasons why scenes end: of hinges, and of joints and cells that turn too far."""
+
+UNDIFFERENTIATED = "Coulomb has no derivatives", "order=4)", "does not depend on x"
+"""Scenes without derivatives, or without a load."""
 
 EXACT = ub.Newton(rtol=1e-12)
 
@@ -223,9 +225,8 @@ def _recorders(one, solution, folder):
 def derivative(one, solution):
     """The derivative by a factor on loads and a stiffness is that of differences of runs."""
     inelastic = any(b.section.section_points(b.section.hinge, True) for b in one.scene.beams)
-    scheme = one.scheme  # the tables of EnergyMomentumDecaying compile for minutes
-    slow = isinstance(scheme, ub.EnergyMomentumDecaying) or getattr(scheme, "order", 2) > 2
-    if one.seed % 10 or one.steps != one.dt or inelastic or slow:
+    usual = isinstance(one.scheme, ub.EnergyMomentum) and one.scheme.order == 2 and not inelastic
+    if one.seed in SAMPLE and not usual:  # the tables of others compile for half a minute
         return
     arguments = {"t": (0, STEPS * one.dt), "dt": one.dt, "newton": TIGHT}
 
@@ -235,19 +236,20 @@ def derivative(one, solution):
     def last(s):
         return motion(one, s)[:, -1]
 
-    found = ub.differentiate(model, {"x": 1.0}, one.scheme, **arguments)
-    exact, limit = found.of(last)[..., 0], found.ranges["x"].change
-    errors, values = [], []
-    for h in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
-        values.append(
-            difference(lambda x: last(ub.simulate(model(x), one.scheme, **arguments)), 1.0, h)
-        )
-        errors.append(np.abs(values[-1] - exact).max() / max(np.abs(exact).max(), 1e-3))
-        if errors[-1] < 1e-6:
+    try:
+        found = ub.differentiate(model, {"x": 1.0}, one.scheme, **arguments)
+    except ub.ArgumentError as error:
+        if not any(words in str(error) for words in UNDIFFERENTIATED):
+            raise
+        return
+    exact = found.of(last)[..., 0]
+    size, errors = max(np.abs(exact).max(), 1e-3), []
+    for h in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9):  # until no run cuts its steps elsewhere
+        d = difference(lambda x: last(ub.simulate(model(x), one.scheme, **arguments)), 1.0, h)
+        errors.append(np.abs(d - exact).max() / size)
+        if errors[-1] < max(1e-6, 3e-13 / h):  # differences lose digits
             return
-    digits = min(np.abs(a - b).max() for a, b in pairwise(values)) / np.abs(exact).max()
-    if limit > 2.5e-7:
-        assert min(errors) < 3 * digits, f"derivatives {min(errors):.1e}, {digits:.1e}, {limit}"
+    raise AssertionError(f"derivatives {min(errors):.1e}")
 
 
 FURTHER = restarts, in_other_axes, by_reference, vibrations, recorders, derivative
