@@ -441,6 +441,8 @@ def still(*loads):
         (lambda: st.imperfect(ub.Scene([b := beam()]), bow={b: 6.7}), "bow 6.7"),
         (lambda: st.HotSpot.fibre(beam(section=square()).start, y=100.0, E=210e9), "y is in m"),
         (lambda: still(lambda b: ub.MovingLoad(b, lambda t: 100 + t, (0, -1))), "does not act"),
+        (lambda: still(lambda b: ub.MovingLoad(b, lambda t: 3 * t, (0, -1))), "in one step, so"),
+        (lambda: still(lambda b: ub.MovingLoad(b, lambda t: 2 - 3 * t, (0, -1))), "in one step"),
         (
             lambda: still(lambda b: ub.Gravity(), lambda b: ub.MovingLoad(b, lambda t: t, mass=1)),
             "its mass has no weight",

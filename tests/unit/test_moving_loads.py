@@ -106,6 +106,14 @@ def test_a_load_crosses_several_beams_as_one(scheme):
         np.testing.assert_allclose(two, one, atol=1e-9 * np.abs(one).max())
 
 
+def test_adaptive_steps_end_where_a_load_comes_and_leaves():
+    """The impulse is force times duration, although the load crosses in 1 % of the run."""
+    beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
+    scene = ub.Scene([beam], loads=[ub.MovingLoad(beam, lambda t: 100 * t - 101, (0, -40))])
+    crossed = run(scene, t=(0, 2), dt=ub.Adaptive(1e-4))
+    assert crossed.momentum()[-1, 1] == pytest.approx(-40 * 2 / 100, rel=1e-8)
+
+
 def test_a_load_that_stands_still_is_a_point_load():
     """At a vertex; with the buckling factors of a column, too."""
     beam = ub.Beam((0, 0), (0, 2), SECTION, cells=4)

@@ -27,7 +27,8 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
 TOUCHING = 1e-3
-"""Largest gap between vertices that touch, as a fraction of the length of the shorter beam."""
+"""Largest gap between vertices that touch, as a fraction of the length of the shorter beam; also
+between a load and the end of its route."""
 
 JUMP = 1e-6
 """Largest initial jump without a warning: an angle in rad, or a fraction of the scene's size."""
@@ -78,8 +79,11 @@ def warn_of_rates(scene: Scene) -> None:
             )
 
 
-def warn_of_loads(scene: Scene, t: tuple[float, float]) -> None:
-    """Warn of moving loads that are never on their beam or have no weight, and of large gaps."""
+def warn_of_loads(scene: Scene, t: tuple[float, float], ends: Array) -> None:
+    """Warn of moving loads that are missed or have no weight, and of large gaps.
+
+    ``ends`` (s) are those of equal steps, empty for adaptive steps.
+    """
     heavy = any(isinstance(load, Gravity) for load in scene.loads)
     for connector in scene.connectors:
         if isinstance(connector.law, Clearance):
@@ -89,13 +93,23 @@ def warn_of_loads(scene: Scene, t: tuple[float, float]) -> None:
         if not isinstance(load, MovingLoad):
             continue
         try:
-            places = np.array([value_at(load.position, x, load) for x in np.linspace(*t, 41)])
+            places, at_ends = map(load.places, (np.linspace(*t, 41, dtype=float), ends))
         except ArgumentError:  # the run names the time
             continue
+        part = at_ends / load.length
+        side = (part > 1.0 - TOUCHING) * 1 - (part < TOUCHING)
+        crossings = np.flatnonzero(side[1:] * side[:-1] < 0)
         if (places < 0.0).all() or (places > load.length).all():
             warn(
                 f"{load}: its position is from {places.min():.3g} to {places.max():.3g} m in the "
                 f"run, and never on its route of {load.length:.3g} m, so that it does not act"
+            )
+        elif len(crossings):
+            first, last = ends[crossings[0] :][:2]
+            warn(
+                f"{load}: it crosses its route of {load.length:.3g} m between t = {first:.4g} and "
+                f"{last:.4g} s, in one step, so that it acts in the whole step or not at all. Give "
+                "a shorter dt, or in dynamics dt=Adaptive(...)"
             )
         if heavy and load.mass and load.force == (0.0, 0.0):
             warn(

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar
@@ -378,6 +378,22 @@ class MovingLoad(Load):
             points = [beam.at(s).point for s in ends]
             length += sum(math.dist(a, b) for a, b in pairwise(points))
         return length * (1.0 + 1e-9)
+
+    def places(self, times: Array) -> Array:
+        """Return the distances from the start of the first beam; (n,); m."""
+        return np.array([value_at(self.position, float(t), self) for t in times])
+
+    def arrivals(self, t0: float, t1: float) -> Iterator[float]:
+        """Yield times at which the load comes to the beams or leaves them; s.
+
+        They are exact if its speed is constant in a thousandth of the run.
+        """
+        times = np.linspace(t0, t1, 1001, dtype=np.float64)
+        places = self.places(times)
+        for end in (0.0, self.length):
+            for k in np.flatnonzero(np.diff(places > end)):
+                fraction = (end - places[k]) / (places[k + 1] - places[k])
+                yield float(times[k] + fraction * (times[k + 1] - times[k]))
 
 
 @closed(OWN_LOAD)

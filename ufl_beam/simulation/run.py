@@ -141,9 +141,10 @@ def simulate(
             "EnergyMomentum(alpha, beta) or GeneralizedAlpha(rho_inf)"
         )
     if isinstance(scene, Scene):
-        warn_of_loads(scene, (t0, t1))
-        if has_inertia(scheme) and not isinstance(dt, Adaptive):
-            ends = np.linspace(t0, t1, step_count(t1 - t0, dt) + 1, dtype=np.float64)
+        steps = -1 if isinstance(dt, Adaptive) else step_count(t1 - t0, dt)
+        ends = np.linspace(t0, t1, steps + 1, dtype=np.float64)
+        warn_of_loads(scene, (t0, t1), ends)
+        if has_inertia(scheme) and len(ends):
             warn_of_tables(scene, ends)
     require_count(every, "simulate: every")
     require_count(max_states, "simulate: max_states")

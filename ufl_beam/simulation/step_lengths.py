@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -13,8 +14,15 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.cells_in_space import rotations_between
 from ufl_beam.discretization.state_io import Archive, State
-from ufl_beam.errors import ConvergenceError, StepFailed, require_number, require_sequence
+from ufl_beam.errors import (
+    ArgumentError,
+    ConvergenceError,
+    StepFailed,
+    require_number,
+    require_sequence,
+)
 from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
+from ufl_beam.model.loads import MovingLoad
 from ufl_beam.output.output_files import add_prefix, remove_prefix
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.simulation import Simulation
@@ -111,7 +119,8 @@ class Adaptive:
     takes about three times as long.
 
     Steps end at the times of every :class:`Table` in the scene, at the times in an attribute
-    ``kinks`` of other functions of time, at ``stops``, and at samples of controllers.
+    ``kinks`` of other functions of time, where a :class:`MovingLoad` comes to its beams or leaves
+    them, at ``stops``, and at samples of controllers.
 
     Args:
         tolerance: Largest error of a step.  Errors of positions are divided by the size of the
@@ -167,6 +176,10 @@ class AdaptiveSteps(Steps):
         self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
+        for load in simulation.scene.loads:
+            if isinstance(load, MovingLoad):
+                with suppress(ArgumentError):  # the run names the time
+                    kinks.update(load.arrivals(t0, t1))
         # Of times closer than this, only the first is used: they may differ by round-off alone.
         same = max(1e-9 * (t1 - t0), self._shortest)
         inside = sorted(t for t in (*kinks, *control.stops) if t0 + same < t < t1 - same)
