@@ -237,6 +237,25 @@ def test_masses_and_periods_are_required(plain):
         plain.asce41(design, site="X")
 
 
+@pytest.mark.filterwarnings("ignore:.*just touches")
+def test_a_tie_is_closed_before_the_push():
+    """[closed] A pinned post with a tie at 45°, which bears √2 times the shear."""
+    post = ub.Beam((0, 0), (0, 3), ub.Section(EA=1e12, GA=1e12, EI=EI), cells=1)
+    tie = ub.Stretch(ub.ground(-3, 0), post.end, ub.Stop(1e7, high=0.0))
+    scene = ub.Scene(
+        [post],
+        connectors=[tie],
+        supports=[ub.Pinned(post.start)],
+        masses=[ub.PointMass(post.end, MASS)],
+    )
+    with raises("nothing resists the mode with the largest effective mass; give supports, or a"):
+        st.pushover(scene, post.end, 1e-3)
+    closed = replace(scene, loads=[ub.PointLoad(post.end, (1.0, 0.0))])
+    curve = st.pushover(closed, post.end, 1e-5, steps=2)
+    assert curve.stiffness == pytest.approx(1e7 / 2, rel=1e-4)
+    assert curve.period == pytest.approx(2 * math.pi * math.sqrt(MASS / (1e7 / 2)), rel=1e-4)
+
+
 def test_a_structure_that_its_loads_break_is_refused():
     """A push of 200 kN is beyond the limit load of 4 M_p/h, and the weights P make it unstable."""
     scene = portal(P)

@@ -566,7 +566,11 @@ def _main_mode(
     masses: list[tuple[AttachmentPoint, float]],
     axis: int,
 ) -> tuple[Shape, float]:
-    """Return shape and period (s) of the undamped mode with the largest effective mass."""
+    """Return shape and period (s) of the undamped mode with the largest effective mass.
+
+    Raises:
+        ArgumentError: Nothing resists this mode.
+    """
     shapes = computed_modes(scene, MODES, start, mesh, damped=False)
     m = np.array([mass for _, mass in masses])
     effective = []
@@ -574,6 +578,11 @@ def _main_mode(
         motion = np.array([shapes.shape(k, at)[: len(at.point)].real for at, _ in masses])
         effective.append(float((m @ motion[:, axis]) ** 2 / (m @ motion**2).sum()))
     k = int(np.argmax(effective))
+    if shapes.frequencies[k] == 0.0:
+        raise ArgumentError(
+            "pushover: nothing resists the mode with the largest effective mass; give supports, or "
+            "a load that closes stops, such as ties, which count as open where they just touch"
+        )
     return lambda at: float(shapes.shape(k, at)[axis].real), 1.0 / float(shapes.frequencies[k])
 
 
