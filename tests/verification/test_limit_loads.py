@@ -70,6 +70,31 @@ def test_mechanisms_of_a_portal(feet, sway, factor):
     assert pytest.approx(factor * M_P, rel=5e-3) == force
 
 
+@pytest.mark.parametrize(("V", "H"), [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (2.0, 1.0)])
+def test_arc_length_reaches_the_mechanism_of_a_portal(V, H):
+    """[closed] Beam 8 M_p/(V L), sway 4 M_p/(H h), combined 6 M_p/(V L/2 + H h); the least one.
+
+    Displacements at the limit load are 1e-4 of the frame, so its path has a corner of 90°.
+    """
+    h, L, hinge = 1.0, 1.5, ub.ElastoPlastic(M_P)
+    stiff = ub.Section(EA=1e9, GA=1e9, EI=EI)
+    at_ends = {0.0: hinge, 1.0: hinge}
+    left = ub.Beam((0, 0), (0, h), stiff, cells=2, hinges=at_ends)
+    right = ub.Beam((L, h), (L, 0), stiff, cells=2, hinges=at_ends)
+    roof = ub.Beam((0, h), (L, h), stiff, cells=2, hinges={0.5: hinge})
+    loads = [ub.PointLoad(roof.at(0.5), force=(0, -V), amplitude=lambda t: t)] * (V > 0)
+    loads += [ub.PointLoad(left.end, force=(H, 0), amplitude=lambda t: t)] * (H > 0)
+    supports = [ub.Clamped(left.start), ub.Clamped(right.end)]
+    scene = rigid_chain([left, roof, right], supports=supports, loads=loads)
+    works = [(8, V * L), (4, H * h), (6, V * L / 2 + H * h)]
+    limit = min(of_hinges * M_P / work for of_hinges, work in works if work > 0)
+
+    path = ub.follow(scene, ub.ArcLength(0.05, factor=limit), steps=30)
+    size = np.abs(path.displacement(roof.at(0.5))).max(axis=1)
+    assert size[-1] > 0.2  # far along the mechanism
+    assert path.factor[size < 1e-3].max() == pytest.approx(limit, rel=1e-4)
+
+
 # -- a cantilever that breaks --------------------------------------------------------------------
 
 ARMERO = {"EI": 77650e3, "M_c": 37.9e3, "M_u": 374e3, "H": 29400e3, "K_s": 18000e3}

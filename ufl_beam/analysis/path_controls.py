@@ -452,6 +452,22 @@ class ArcLength(Control):
         side = corrector.dissipation_side(corrector.simulation.q + increment[:-1], direction)
         return side or corrector.along(corrector.weights * increment, direction)
 
+    def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
+        """Solve for the end of a step; if it fails, on a plane across the predicted motion.
+
+        Where the last hinge of a mechanism opens, the path turns to a constant load factor, which
+        may be parallel to the plane across the predicted step.
+        """
+        try:
+            return super().solve_step(corrector, fraction)
+        except StepFailed:
+            step = abs(self.step) * fraction * corrector.direction
+            normal = corrector.weights * np.append(step[:-1], 0.0)
+            size = corrector.along(normal, step)
+            if not (corrector.dissipates and size > 0):
+                raise
+        return corrector.attempt(step, normal, size)
+
 
 @dataclass(frozen=True)
 class LoadControl(Control):
