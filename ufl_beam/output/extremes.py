@@ -201,12 +201,13 @@ class ExtremesInC:
 class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
-    All steps are included, even if the solution does not store them.  Steps that the solver divides
-    count as their substeps.  Memory does not grow with the number of steps.  Section forces are
-    evaluated at equally spaced points of each cell, both ends included, as in
-    :meth:`Solution.diagram`.  During a run, processes that share the scene have the extremes up to
-    the end of the last whole step.  In space Python updates the extremes after each whole step,
-    and rotations are those of :meth:`Solution.displacement`.
+    All steps are included, even if the solution does not store them, and the initial state, which
+    is unloaded in statics without ``start=``.  Steps that the solver divides count as their
+    substeps.  Memory does not grow with the number of steps.  Section forces are evaluated at
+    equally spaced points of each cell, both ends included, as in :meth:`Solution.diagram`.  During
+    a run, processes that share the scene have the extremes up to the end of the last whole step.
+    In space Python updates the extremes after each whole step, and rotations are those of
+    :meth:`Solution.displacement`.
 
     Args:
         points: Number of points of a cell, at least 2.
