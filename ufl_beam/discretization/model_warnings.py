@@ -171,62 +171,68 @@ def warn_of_free_hinges(scene: Scene) -> None:
 
 def warn_of_touching(numbering: DofNumbering) -> None:
     """Warn of ends of beams that touch another beam without a connection."""
-    if not numbering.scene.beams or not len(pairs := _touching(numbering)):
+    if not numbering.scene.beams or not len(touching := _touching(numbering)):
         return
-    end, touched = (numbering.place(int(vertex)) for vertex in pairs[0])
-    gap = math.dist(end.point, touched.point)
-    more = f"; so do {len(pairs) - 1} more pairs of places" if len(pairs) > 1 else ""
+    end, touched = (numbering.place(int(vertex)) for vertex in touching[0, :2])
+    more = f"; so do {len(touching) - 1} more pairs of places" if len(touching) > 1 else ""
+    gap = float(touching[0, 2])
+    beside = math.dist(end.point, touched.point) > 2 * gap + TOUCHING * numbering.scene.size
+    at = f"{touched.beam.name} beside {touched}" if beside else touched
     warn(
-        f"{end} and {touched} touch ({gap:.3g} m apart), but no joint or connector joins them, "
+        f"{end} and {at} touch ({gap:.3g} m apart), but no joint or connector joins them, "
         f"so that they move independently{more}. Join them with Rigid or Revolute if they are "
         "connected"
     )
 
 
-def _touching(numbering: DofNumbering) -> Index:
-    """Return pairs of an end and the nearest vertex of a beam that it touches; (num_pairs, 2).
+def _touching(numbering: DofNumbering) -> Array:
+    """Return ends, the nearest vertices of beams that they touch, and the gaps (m); (n, 3).
 
     Ends that are connected with a vertex of the beam that they touch are left out.
     """
     first = numbering.first_vertices
     end, touched, gap = _contacts(numbering.points[: first[-1]], first)
     if not len(end):
-        return np.empty((0, 2), dtype=np.int64)
+        return np.empty((0, 3))
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     group = _groups(numbering)[: first[-1]]
     joined = group[end] == group[touched]
     keys = end * len(first) + beams[touched]
     loose = ~joined & ~np.isin(keys, keys[joined])
     if not loose.any():
-        return np.empty((0, 2), dtype=np.int64)
+        return np.empty((0, 3))
     end, touched, gap, keys = end[loose], touched[loose], gap[loose], keys[loose]
     order = np.lexsort((gap, keys))
     _, nearest = np.unique(keys[order], return_index=True)
-    pairs = np.column_stack([end, touched])[order][nearest]
+    rows = np.column_stack([end, touched, gap])[order][nearest]
     # Two ends that touch each other count as one pair.
-    _, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
-    return np.asarray(pairs[np.sort(once)])
+    _, once = np.unique(np.sort(rows[:, :2], axis=1), axis=0, return_index=True)
+    return np.asarray(rows[np.sort(once)])
 
 
 @cached_by_structure
 def _contacts(points: Array, first: Index) -> tuple[Index, Index, Array]:
-    """Return ends of beams, the vertices of beams that they touch, and the gaps (m), (n,) each.
+    """Return ends of beams, the nearest vertices of cells that they touch, and the gaps (m).
 
-    The vertices of beam i are ``points[first[i] : first[i + 1]]``.
+    The vertices of beam i are ``points[first[i] : first[i + 1]]``.  All arrays are (n,).
     """
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     ends = np.column_stack([first[:-1], first[1:] - 1]).ravel()
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(beams) == 0)
-    lengths = np.bincount(beams[:-1], weights=steps, minlength=len(first) - 1)
-    reach = TOUCHING * lengths[beams]
-    tree = KDTree(points)
-    neighbours = tree.query_ball_point(points[ends], reach[ends], return_sorted=False)
-    counts = np.array([len(indices) for indices in neighbours])
-    end = np.repeat(ends, counts)
-    touched = np.fromiter(chain.from_iterable(neighbours), dtype=np.int64, count=len(end))
+    start = np.flatnonzero(np.diff(beams) == 0)  # of each cell
+    way = points[start + 1] - points[start]
+    sizes = np.linalg.norm(way, axis=1)
+    reach = TOUCHING * np.bincount(beams[start], weights=sizes, minlength=len(first) - 1)[beams]
+    tree, middles = KDTree(points[ends]), points[start] + way / 2
+    near = tree.query_ball_point(middles, sizes / 2 + reach[start], return_sorted=False)
+    counts = np.array([len(indices) for indices in near])
+    cell = np.repeat(np.arange(len(start)), counts)
+    end = ends[np.fromiter(chain.from_iterable(near), dtype=np.int64, count=len(cell))]
+    way, beyond = way[cell], points[end] - points[start[cell]]
+    s = np.clip(np.sum(way * beyond, axis=1) / sizes[cell] ** 2, 0.0, 1.0)
+    gap = np.linalg.norm(beyond - s[:, None] * way, axis=1)
+    touched = start[cell] + (s > 0.5)
     # Within one beam, only contact of both ends counts.
     apart = (beams[end] != beams[touched]) | (np.isin(touched, ends) & (end < touched))
-    gap = np.linalg.norm(points[end] - points[touched], axis=1)
     touching = apart & (gap <= np.minimum(reach[end], reach[touched]))
     return end[touching], touched[touching], gap[touching]
 
