@@ -12,7 +12,7 @@ from scenes import clamped
 import ufl_beam as ub
 
 STIFF = ub.Section(EA=1e10, GA=1e10, EI=1e9, rhoA=100.0, rhoI=1.0)
-SOFT = ub.Section.rectangle(b=0.02, h=0.02, E=1e8, nu=0.3, rho=7850.0)
+SOFT = ub.Section.rectangle(b=0.02, h=0.02, E=1e8, nu=0.3, rho=2000.0)
 SOLVED = 1e-8  # part of the largest value that the tolerance of the solver, 1e-10, leaves at most
 
 

@@ -418,6 +418,7 @@ def still(*loads):
         (lambda: square(E=210e3), "are of no material"),
         (lambda: square(rho=7.85), "are of no material"),
         (lambda: square(E=30e3, rho=2500.0), "are of no material"),
+        (lambda: square(E=210e6), "are of no material"),  # kN/m²
         (lambda: square(355.0), "yield strain 1.69e-09"),
         (
             lambda: square(E=27e9, rho=2400.0, fibres=ub.Fibres(st.Mander(30e6, 0.2))),

@@ -26,6 +26,9 @@ RANGES = {
 STRUCTURAL = (400.0, 9000.0), (2e10, 3e11)
 """Densities of timber to steel, kg/m³; moduli of concrete to steel, Pa."""
 
+RUBBER = 800.0, 2300.0
+"""Densities of rubber, whose modulus may be as small as one of steel in kN/m²; kg/m³."""
+
 
 def check(owner: str, kind: str, value: float) -> None:
     """Warn if a number is out of its range in :data:`RANGES`."""
@@ -35,9 +38,10 @@ def check(owner: str, kind: str, value: float) -> None:
 
 
 def check_material(E: float, rho: float) -> None:
-    """Warn of a modulus in MPa or GPa, or a density in t/m³, beside a usual value of the other."""
+    """Warn of a modulus in kN/m², MPa or GPa, or a density in t/m³, beside a usual other one."""
     (light, heavy), (soft, stiff) = STRUCTURAL
-    wrong_E = light <= rho <= heavy and E >= 1.0 and E / rho < 100.0
+    least = 100.0 if RUBBER[0] < rho < RUBBER[1] else 5e4
+    wrong_E = light <= rho <= heavy and E >= 1.0 and E / rho < least
     wrong_rho = soft <= E <= stiff and 2.0 <= rho <= heavy / 1e3
     if wrong_E or wrong_rho:
         warn(
