@@ -95,6 +95,29 @@ def test_arc_length_reaches_the_mechanism_of_a_portal(V, H):
     assert path.factor[size < 1e-3].max() == pytest.approx(limit, rel=1e-4)
 
 
+@pytest.mark.parametrize("slenderness", [1.0, 1.5])
+def test_limit_of_a_crooked_column_does_not_depend_on_the_control(slenderness):
+    """Between first yielding, by Perry's formula, and Euler's load; the cells add 1 %."""
+    fy, E, h, b, bow = 235e6, 210e9, 0.2, 0.1, 1e-3
+    fibres = ub.Fibres(ub.ElastoPlastic(fy, isotropic=1e6), number=10)
+    section = ub.Section.rectangle(b, h, E=E, nu=0.3, fibres=fibres)
+    squash, length = fy * b * h, slenderness * math.pi * math.sqrt(section.EI / (fy * b * h))
+    column = ub.Beam.along(
+        lambda s: (bow * length * math.sin(math.pi * s), length * s), section, cells=16
+    )
+    supports = [ub.Pinned(column.start), ub.Roller(column.end, along=(0, 1))]
+    load = ub.PointLoad(column.end, force=(0, -squash), amplitude=lambda t: t)
+    scene = ub.Scene([column], supports=supports, loads=[load])
+    limits = [
+        ub.follow(scene, ub.ArcLength(0.01, factor=factor), steps=steps).factor.max()
+        for factor, steps in ((0.5, 200), (5.0, 30))
+    ]
+    assert limits[0] == pytest.approx(limits[1], rel=1e-7)
+    η = bow * length * (h / 2) / (h**2 / 12)
+    φ = (1 + η + slenderness**2) / 2
+    assert 1 / (φ + math.sqrt(φ**2 - slenderness**2)) < limits[0] < 1.01 / slenderness**2
+
+
 # -- a cantilever that breaks --------------------------------------------------------------------
 
 ARMERO = {"EI": 77650e3, "M_c": 37.9e3, "M_u": 374e3, "H": 29400e3, "K_s": 18000e3}

@@ -456,17 +456,19 @@ class ArcLength(Control):
         """Solve for the end of a step; if it fails, on a plane across the predicted motion.
 
         Where the last hinge of a mechanism opens, the path turns to a constant load factor, which
-        may be parallel to the plane across the predicted step.
+        may be parallel to the plane across the predicted step.  Dissipation tells its sense.
         """
         try:
             return super().solve_step(corrector, fraction)
-        except StepFailed:
+        except StepFailed as failure:
             step = abs(self.step) * fraction * corrector.direction
             normal = corrector.weights * np.append(step[:-1], 0.0)
-            size = corrector.along(normal, step)
-            if not (corrector.dissipates and size > 0):
+            if not (size := corrector.along(normal, step)) > 0:
                 raise
-        return corrector.attempt(step, normal, size)
+            trial = corrector.attempt(step, normal, size)
+            if not corrector.dissipation(trial.q1) > 0:
+                raise failure from None
+        return trial
 
 
 @dataclass(frozen=True)
