@@ -2,11 +2,13 @@
 """What is reported to happen, and when."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from scenes import clamped
 
 import ufl_beam as ub
+import ufl_beam.structures as st
 
 ELASTIC = ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3)
 
@@ -102,3 +104,25 @@ def test_friction_goes_on_as_it_was(last):
     found = first + events((last, 0.3), run)[1]
     assert [what for what, _ in found] == ["slides"]
     assert found == [(what, pytest.approx(time)) for what, time in whole]
+
+
+SECTION = ub.Section.rectangle(0.1, 0.2, E=210e9, nu=0.3, rho=7850.0)
+
+
+@pytest.mark.parametrize(
+    ("laws", "least"),
+    [
+        ({"interaction": st.AxialBending(5e6, 3e5)}, 0),
+        ({"bending": st.ArmstrongFrederick(3e5, 1e6, 5.0)}, 0),
+        ({"bending": st.MenegottoPinto(3e5, 0.01)}, 1),  # flows from the beginning
+    ],
+)
+def test_cells_yield_once_and_not_by_round_off(laws, least):
+    """The moment is a seventh of the limit, and changes its sign."""
+    beam = ub.Beam((0, 0), (2, 0), replace(SECTION, **laws), cells=3)
+    load = ub.PointLoad(beam.end, (1e4, -2e4), amplitude=lambda t: math.sin(20 * t))
+    events = ub.Events()
+    scene = clamped(beam, loads=[load])
+    moved = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, record=events)
+    assert len(events.found) == least * 3
+    assert len(st.hinge_table(moved).rows) == least

@@ -344,6 +344,8 @@ class Events(Restartable):
         self._followed = [i for i, c in enumerate(connectors) if type(c.law) in CONNECTOR_EVENTS]
         self._in_cells, self._on = self._look(simulation)  # events before the run
         if state is not None:
+            require_arrays(state, {"in_cells": self._in_cells.shape})
+            self._in_cells |= state["in_cells"] > 0
             rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
             self._add(simulation, rows)
 
@@ -370,6 +372,7 @@ class Events(Restartable):
         """Record the events of a step."""
         (in_cells, on), t = self._look(simulation), simulation.t
         changes = np.argwhere(in_cells & ~self._in_cells)
+        in_cells |= self._in_cells  # a dissipation that falls again is no second event
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
         for k in np.flatnonzero(on != self._on):
             number = self._followed[k]
@@ -402,4 +405,4 @@ class Events(Restartable):
     def state(self) -> State:
         """Return the events so far: time, number of the cell or connector, and kind."""
         events = np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])
-        return {"events": events, "work": self._work}
+        return {"events": events, "work": self._work, "in_cells": self._in_cells.astype(float)}

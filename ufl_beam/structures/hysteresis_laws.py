@@ -107,6 +107,11 @@ class ArmstrongFrederick(PlasticLaw):
         change = (direction * B - r * state.back) * γ / (1 + r * γ)
         return {"plastic": direction * γ, "back": change}
 
+    def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
+        """Return the plastic work that the back stress does not store; zero without flow."""
+        worked = self.stress(strain, state) * changes.plastic
+        return worked - state.back * changes.back / self.kinematic
+
     def hardening_energy(self, state: State) -> Values:
         """Return the density of the energy stored by the back stress."""
         return state.back**2 / (2 * self.kinematic)
@@ -212,6 +217,11 @@ class AxialBending(Record, MaterialLaw):
         """Return the elastic energy per length."""
         (Σ, K), (EA, EI) = strain, self.C
         return (EA * (Σ - state.stretch) ** 2 + EI * (K - state.curvature) ** 2) / 2
+
+    def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
+        """Return the work of (N, M) on the plastic strains; without flow it is exactly zero."""
+        N, M = self.stress(strain, state)
+        return N * changes.stretch + M * changes.curvature
 
     def excess(self, N: Values, M: Values) -> Values:
         """Return the yield function, which is positive outside the surface."""
