@@ -292,8 +292,9 @@ class Events(Restartable):
 
     A hinge "is free" when it has dissipated 99.9 % of its fracture energy; a hardening hinge
     "yields".  So do connectors of rotations, alone or in a :class:`Bushing`, with a law of yielding
-    or softening.  Contact and sliding
-    may begin and end repeatedly; all other events occur once in a cell or hinge.
+    or softening.  A cell "yields" when it first dissipates: under the first load if its law has no
+    elastic range, as ``st.KentPark``.  Contact and sliding may begin and end
+    repeatedly; all other events occur once in a cell or hinge.
 
     Args:
         tell: Function, such as ``print``, that the first process calls with each event when the
