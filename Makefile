@@ -46,7 +46,7 @@ verify: ## the slow verification studies, then the unit tests with sanitizers
 	@$(MAKE) --no-print-directory sanitize
 
 sanitize: ## the unit tests with address and undefined-behaviour sanitizers in C; `make sanitize every=10` a tenth of them
-	@./env sh -ec '$(with_sanitizers) python3 -m pytest tests/unit --capture=sys -p no:cacheprovider --every=$(every)'
+	@./env sh -ec '$(with_workers) $(with_sanitizers) python3 -m pytest $$workers tests/unit --capture=sys -p no:cacheprovider --every=$(every)'
 
 long: ## a million steps of a softening frame: memory, files and ledger; a quarter of an hour
 	@UFL_BEAM_STEPS=1000000 ./env python3 -m pytest -m slow -s tests/verification/test_long_run.py

@@ -25,7 +25,7 @@ from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain mi
 
 # isort: split
 
-from ufl_beam import extend
+from ufl_beam import extend as extend
 from ufl_beam.analysis.critical_points import Branch as Branch
 from ufl_beam.analysis.critical_points import CriticalPoint as CriticalPoint
 from ufl_beam.analysis.derivatives import Derivatives as Derivatives
@@ -59,7 +59,7 @@ from ufl_beam.mechanics.time_schemes import (
     Newmark,
     Static,
 )
-from ufl_beam.model import distributions
+from ufl_beam.model import distributions as distributions
 from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
 from ufl_beam.model.bodies import BodyPoint as BodyPoint
@@ -146,8 +146,8 @@ __all__ = [
     "Rayleigh", "Release", "Revolute", "Rigid", "RigidLink", "RigidPlastic", "Roller",
     "RotatingFrame", "Scene", "Section", "Simulation", "Slide", "Softening", "Solution",
     "Spherical", "Spline", "Spring", "Static", "Stop", "Stretch", "Support", "Table", "Turn",
-    "Universal", "Velocity", "VirtualWork", "animate", "buckling", "differentiate", "distributions",
-    "extend", "follow", "gradient", "ground", "linearize", "modes", "picture", "plot", "print_once",
+    "Universal", "Velocity", "VirtualWork", "animate", "buckling", "differentiate",
+    "follow", "gradient", "ground", "linearize", "modes", "picture", "plot", "print_once",
     "ramp", "render", "simulate", "study", "tradeoff",
 ]  # fmt: skip
 

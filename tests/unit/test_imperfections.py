@@ -46,6 +46,17 @@ def test_a_bow_is_amplified(ratio, by_mode):
     assert pytest.approx(force * total, rel=1e-6) == M
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_the_amplitude_of_a_mode_does_not_depend_on_axes(angle):
+    """It is the largest distance that a point moves."""
+    end = np.array([math.cos(angle), math.sin(angle)]) * L
+    column = ub.Beam((0, 0), tuple(end), SECTION, cells=4, name="column")
+    load = ub.PointLoad(column.end, tuple(-end))
+    scene = ub.Scene([column], supports=[ub.Clamped(column.start)], loads=[load])
+    crooked = st.imperfect(scene, mode=ub.buckling(scene, 1), amplitude=0.01)
+    assert math.dist(crooked["column"].curve(1.0), end) == pytest.approx(0.01, rel=1e-9)
+
+
 def test_sway_of_a_cantilever():
     """[closed] M = P φ L tan(κL)/κL with κ² = P/EI, for small rotations; the mesh adds (κh)²/12."""
     load, φ = 0.15 * EULER, 1e-4

@@ -288,21 +288,17 @@ class SmallMotions(Linearization):
     def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
         """Return the n eigenvalues nearest to zero, and shapes with a largest displacement of 1."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
-        shapes = self._Z @ x[:, order]
-        rotations = self._simulation.subdomain.rotations
-        sizes = np.abs(shapes)
-        sizes[self.numbering.multipliers] = 0.0
-        turning = sizes[rotations].max(axis=0, initial=0.0)
-        sizes[rotations] = 0.0
-        # If only rotations move, the largest rotation is 1.
-        only = sizes.max(axis=0, initial=0.0) <= 1e-9 * self.scene.size * turning
-        sizes[np.ix_(rotations, only)] = np.abs(shapes[np.ix_(rotations, only)])
-        largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
-        shapes = shapes / largest
-        if self.scene.in_space:  # lengths of vectors, which do not depend on the axes
-            nodes = np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[:, :3]
-            lengths = np.linalg.norm(shapes[nodes], axis=1).max(axis=0)
-            shapes = shapes / np.where(only, 1.0, lengths)
+        shapes, d = self._Z @ x[:, order], self.numbering.displacements
+        nodes = np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])
+        for k, shape in enumerate(shapes.T):
+            vectors, turned = shape[nodes[:, :d]], shape[nodes[:, d:]]
+            # If only rotations move, the largest rotation is 1.
+            if np.abs(vectors).max() <= 1e-9 * self.scene.size * np.abs(turned).max():
+                vectors = turned
+            lengths = np.linalg.norm(vectors, axis=1)
+            vector = vectors[lengths.argmax()]
+            largest = vector[np.abs(vector).argmax()]
+            shapes[:, k] = shape * (np.abs(largest) / largest / lengths.max())
         real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8
         return values[order], np.asarray(shapes.real if real else shapes)
 

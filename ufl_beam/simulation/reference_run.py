@@ -496,6 +496,8 @@ class ReferenceInSpace(Simulation):
             if change <= SMALL_CHANGE and (left <= self.newton.rtol * size or left > last / 2):
                 return x  # to the tolerance, or to round-off
             last = left
+            if not np.isfinite([left, K.sum()]).all():
+                raise StepFailed("a force is not a finite number")
             try:
                 step = splu(K[free][:, free].tocsc()).solve(r[free])
             except RuntimeError:

@@ -27,7 +27,8 @@ class Newton(Record):
     """Options of Newton's method: tolerance, number of iterations, PETSc options, solver.
 
     Args:
-        rtol: Tolerance of the residual, relative to the forces in the scene.
+        rtol: Tolerance of the residual, relative to the forces in the scene.  With 1e-12 or less,
+            steps of dynamics also keep digits that are lost in large displacements.
         max_iterations: Largest number of iterations of a step; a step that needs more is divided.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option, PETSc's Newton method

@@ -71,7 +71,7 @@ def spectral_accelerations(spectrum: Any, periods: Array, what: str) -> Array:
             listed = ", ".join(f"{x:.4g}" for x in periods[outside])
             raise ArgumentError(
                 f"{what}: the spectrum covers periods from {T[0]:g} to {T[-1]:g} s, but not "
-                f"{listed} s; extend it, or give fewer modes"
+                f"{listed} s; extend it"
             )
         values = np.interp(periods, T, a)
     if (values <= 0).any():

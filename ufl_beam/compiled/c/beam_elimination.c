@@ -332,8 +332,8 @@ typedef double octet __attribute__((vector_size(64), may_alias));
 typedef int64_t eight __attribute__((vector_size(64), may_alias));
 
 /* A chain during elimination. pivot, after, to: rows of the vertex in the columns of the vertex, of the next vertex, of the
- * left end. next, next_to: modified rows of the next vertex in its own columns and those of the left end. from, left:
- * modified rows of the left end in the columns of the vertex and its own. Column 6 of after, next and from is the
+ * left end. next, next_to: modified rows of the next vertex in the columns of this vertex and of the left end. from, left:
+ * modified rows of the left end in the columns of the vertex and of the left end. Column 6 of after, next and from is the
  * right-hand side. */
 typedef struct {
   int chain, vertex, last;

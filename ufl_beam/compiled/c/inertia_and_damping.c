@@ -14,7 +14,10 @@ void add_step_force(void *self, const double *q, double *r)
 {
   const step_product *p = self;
   double *s = p->rate;
-  for (int i = 0; i < p->size; ++i) s[i] = q[i] - p->q0[i];
+  if (p->low)
+    for (int i = 0; i < p->size; ++i) s[i] = q[i] - p->q0[i] + p->low[i];
+  else
+    for (int i = 0; i < p->size; ++i) s[i] = q[i] - p->q0[i];
   for (int k = 0; k < p->rotations; ++k) {
     double *x = s + p->rotation[k];
     *x = 2 * half_tangent(p, k, *x);
@@ -30,7 +33,7 @@ static void find_growth(const step_product *p, const double *q)
   for (int i = 0; i < p->size; ++i) growth[i] = p->factor;
   for (int k = 0; k < p->rotations; ++k) {
     const int32_t at = p->rotation[k];
-    const double half = half_tangent(p, k, q[at] - p->q0[at]);
+    const double half = half_tangent(p, k, q[at] - p->q0[at] + (p->low ? p->low[at] : 0));
     growth[at] += p->factor * half * half;
   }
 }

@@ -80,7 +80,7 @@ typedef struct {
   const uint8_t *place;  /* in one byte each, or */
   const int32_t *far;    /* if one byte is not enough, in four */
   double factor, back;
-  const double *v, *q0;
+  const double *v, *q0, *low; /* low: of the equation, or none */
   double *rate;          /* factor s - back v in the latest force */
   double *space;
   double *turn, *half; /* latest increments of the rotations, and tangents of their halves */
@@ -458,6 +458,7 @@ typedef struct {
   void *left, *factors, *left_f, *left_x; /* in PETSc: reduced system, its factors, two vectors */
   void *snes, *x, *f, *y;                 /* in PETSc: solver; unknowns, residual, change */
   double *unknowns, *residual, *change;   /* local values of these; others use `change` between solutions */
+  double *low; /* what the iterate lost by round-off in this step, see move_to; or none */
   double *found;         /* solution of the reduced system; in PETSc the entries of left_x */
   const double *weight;  /* see Solver */
   int least, most;                             /* numbers of iterations */

@@ -399,8 +399,18 @@ static void turn_node(const double *d, const double *before, double *m, double *
 static void move_to(equation *e, double *x, const double *from, double way)
 {
   double *to = e->to;
+  if (e->low && from == x) {
+    /* Steps keep their digits far from the origin and if they are short: x + low is exact. */
+    for (int i = 0; i < e->size; ++i) {
+      const double before = x[i], change = way * e->change[i], after = before - change, done = before - after;
+      e->low[i] += (before - (after + done)) + (done - change);
+      x[i] = after;
+    }
+    return;
+  }
   if (!e->rotations || e->border) {
     for (int i = 0; i < e->owned; ++i) x[i] = from[i] - way * e->change[i];
+    if (e->low) memset(e->low, 0, e->size * sizeof *x);
     return;
   }
   memcpy(e->space, from, e->size * sizeof *x);
@@ -465,6 +475,7 @@ static int goes_astray(const equation *e)
 static int newton(equation *e, double *x)
 {
   e->iterations = 0;
+  if (e->low) memset(e->low, 0, e->size * sizeof *x);
   TRY(residual_at(e, x));
   for (;;) {
     if (e->monitored) TRY(petsc.SNESMonitor(e->snes, e->iterations, norm_of(e, e->residual)));

@@ -308,6 +308,7 @@ static int measure(time_loop *m)
     turn_axes(e->turned, e->axes, m->x, -1);
   }
   for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
+  for (int i = 0; e->low && i < m->size; ++i) m->s[i] += e->low[i];
   if (e->rotations) turn_with_nodes(m);
   for (int k = 0; k < m->rotations; k += m->axes) {
     double square = 0; /* of a vector in space */
