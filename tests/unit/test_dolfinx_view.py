@@ -183,6 +183,15 @@ def test_a_monitor_sees_each_iteration_and_changes_none():
         simulation.close()
 
 
+@pytest.mark.serial
+def test_a_monitor_sees_a_path(capfd):
+    beam = ub.Beam((0, 0), (3, 0), ub.Section(**STEEL), cells=2)
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda t: t)])
+    options = ub.Newton(petsc={"snes_monitor": ""})
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=2, newton=options)
+    assert capfd.readouterr().out.count("0 SNES Function norm") == len(path)
+
+
 def test_the_matrix_of_snes():
     """PETSc has it from when it is asked for; before, nobody has its columns."""
     simulation = ub.Simulation(frame(), ub.EnergyMomentum(0.1))

@@ -145,6 +145,7 @@ class Solver:
         c.snes, c.monitored = opaque(snes), bool(chosen)
         c.searches = "snes_linesearch_type" not in chosen
         petsc("SNESSetFunction", snes, self._f, *loop("snes_function", c))
+        snes.setSolution(self._x)  # monitors of paths need it before a solution by SNES
         petsc("SNESSetConvergenceTest", snes, *loop("snes_test", c), ffi.NULL)
         self._set_jacobian()
         snes.setTolerances(max_it=self._newton.max_iterations)
