@@ -230,8 +230,8 @@ class GeneralizedAlpha(_Accelerated):
     The weights are by Chung and Hulbert (1993), the form is by Arnold and Brüls (2007): equilibrium
     and constraints are satisfied at the ends of the steps, and the weights average an auxiliary
     acceleration.  For linear scenes this form agrees with the original form.  With joints held by
-    multipliers it is stable if ``rho_inf < 1``.  If the step length changes, the auxiliary
-    acceleration is adjusted to keep the order.
+    multipliers it is stable if ``rho_inf < 1`` and steps are at most 1.5 times as long as the steps
+    before.  If the step length changes, the auxiliary acceleration is adjusted to keep the order.
 
     The ledger, initial accelerations and rate-dependent laws are as in :class:`Newmark`.  In large
     motion the energy may grow; with :class:`EnergyMomentumDecaying` it cannot.
