@@ -214,25 +214,32 @@ def test_hinge_snap_back(law, steepness):
     assert (np.diff(δ[after]) < 0).all()
 
 
-@pytest.mark.parametrize(
-    ("arc", "space"), [(0.03, False), (0.05, False), (0.17, False), (0.05, True)]
-)
-@pytest.mark.parametrize("ratio", [1.0, 6.0])
-def test_a_brittle_hinge_softens_whatever_the_steps(ratio, arc, space):
+HINGES = [("hinge", ratio, arc, 1.0, True) for ratio in (1.0, 6.0) for arc in (0.03, 0.05, 0.17)]
+HINGES += [("hinge in space", ratio, 0.05, 1.0, True) for ratio in (1.0, 6.0)]
+HINGES += [(kind, 1.2, 0.05, 1.0, False) for kind in ("hinge", "hinge in space")]
+
+
+@pytest.mark.parametrize(("kind", "ratio", "arc", "factor", "by_energy"), HINGES)
+def test_a_brittle_hinge_softens_whatever_the_steps(kind, ratio, arc, factor, by_energy):
     """The path goes on to dissipate from the limit on; elastic unloading is a path, too."""
     EI, length, limit = 1e6, 2.0, 10e3  # N m², m, N m
     energy, stiff = limit**2 / (ratio * 3 * EI / length), 1e5 * EI / length**2
+    space, breaks = kind == "hinge in space", kind == "spring"
     more = {"GA3": stiff, "EI2": EI, "GJ": EI} if space else {}
     section = ub.Section(EA=stiff, GA=stiff, EI=EI, **more)
     law, z = ub.Softening(limit=limit, fracture_energy=energy), (0.0,) * space
     beam = ub.Beam(
-        (0, 0, *z), (length, 0, *z), section, cells=4, hinges={0.0: law},
+        (0, 0, *z), (length, 0, *z), section, cells=4, hinges={} if breaks else {0.0: law},
         **({"up": (0, 1, 0)} if space else {}),
     )  # fmt: skip
+    spring = ub.Spring(100 * EI / length, softening=law)
+    turns = [ub.Turn(ub.ground(0, 0), beam.start, spring)] if breaks else []
     load = ub.PointLoad(beam.end, force=(0, limit / length, *z), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    foot = ub.Pinned(beam.start) if breaks else ub.Clamped(beam.start)
+    scene = ub.Scene([beam], supports=[foot], connectors=turns, loads=[load])
+    control = ub.ArcLength(arc, factor=factor)
     path = ub.follow(
-        scene, ub.DissipationControl(energy / 20, ub.ArcLength(arc)), steps=100,
+        scene, ub.DissipationControl(energy / 20, control) if by_energy else control, steps=100,
         until=lambda now: now.ledger.lost["hinges"] > 0.9 * energy,
     )  # fmt: skip
     lost, factor = path.energy["hinges"], path.factor

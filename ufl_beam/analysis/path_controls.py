@@ -158,12 +158,12 @@ class PathCorrector:
     def onward(self) -> tuple[Array, Array]:
         """Return a first part of a step, and the direction after it.
 
-        At an onset the part leads back beyond the limit, which lets the hinge or spring open.
+        At an onset the part leads beyond the limit, which lets the hinge or spring open.
         """
         if not self.onset:
             return 0.0 * self.direction, self.direction
         self.begin()
-        increment = -BEYOND_LIMIT / self.length(self.direction) * self.direction
+        increment = BEYOND_LIMIT / self.length(self.direction) * self.direction
         return increment, self.direction_beyond(increment)
 
     def direction_beyond(self, step: Array) -> Array:
