@@ -217,6 +217,8 @@ def test_hinge_snap_back(law, steepness):
 HINGES = [("hinge", ratio, arc, 1.0, True) for ratio in (1.0, 6.0) for arc in (0.03, 0.05, 0.17)]
 HINGES += [("hinge in space", ratio, 0.05, 1.0, True) for ratio in (1.0, 6.0)]
 HINGES += [(kind, 1.2, 0.05, 1.0, False) for kind in ("hinge", "hinge in space")]
+HINGES += [("spring", ratio, arc, 1.0, True) for ratio in (6.0, 20.0) for arc in (0.05, 0.17)]
+HINGES += [("spring", 1.2, 0.07, 5.0, True)]
 
 
 @pytest.mark.parametrize(("kind", "ratio", "arc", "factor", "by_energy"), HINGES)

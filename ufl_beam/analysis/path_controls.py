@@ -612,7 +612,8 @@ class DissipationControl(Control):
 
         An arc-length step is taken if the last step dissipated no energy and this step does not,
         or if the step by energy fails.  At an onset of dissipation the path goes on to dissipate:
-        an arc-length step could find elastic unloading instead.
+        an arc-length step could find elastic unloading instead.  The part of a step before an
+        onset counts, so that ends of shorter and shorter steps approach the onset.
         """
         if not (corrector.dissipates or corrector.onset):
             with suppress(StepFailed):
@@ -624,6 +625,8 @@ class DissipationControl(Control):
             corrector.begin()
             step = corrector.until(energy, *corrector.onward())
             if (kink := corrector.kink(step)) is not None:
+                before = corrector.length(kink[0]) / abs(self.otherwise.step)
+                energy *= max(1 - before / fraction, self.otherwise.least_rest)
                 step = corrector.until(energy, *kink)
             return corrector.attempt(step, None, energy, hold=False)
         except StepFailed:

@@ -280,6 +280,7 @@ class PathStepper:
         The end is stored in the solution if ``keep``.  Raise :class:`StepFailed` if even the
         shortest step fails.
         """
+        self._fraction = max(self._fraction, 16 * SMALLEST_FRACTION)
         while True:
             iterations = self._simulation.iterations
             self._fraction = self._control.shortened(self.corrector, self._fraction)
