@@ -61,7 +61,6 @@ MADE = {"Connector", "Joint", "Solution", "Support"}
 """What others return; nobody makes them."""
 
 ELSEWHERE = {
-    "modules": "distributions extend",
     "sections alike": "box of_sectionproperties",
     "analyses of sections": "interaction_diagram moment_curvature",
     "analyses of histories": "damping damping_ratio fit_decay logarithmic_decrement peaks rainflow "

@@ -161,8 +161,8 @@ def test_beams_that_touch_without_a_joint():
             begin(a, b)
     with warns("b.start (0.5, 0) and a.at(0.5) (0.5, 0) touch"):
         begin(a, middle)
-    with warns("b.start (0.4, 0.0001) and a beside a.at(0.5) (0.5, 0) touch (0.0001 m apart)"):
-        begin(a, beam((0.4, 1e-4), (0.4, 1), name="b"))  # between two vertices of a
+    with warns("b.start (0.4, 5e-05) and a beside a.at(0.5) (0.5, 0) touch (5e-05 m apart)"):
+        begin(a, beam((0.4, 5e-5), (0.4, 1), name="b"))  # between two vertices of a
     ring = ub.Beam.arc((0, 0), 1.0, (0, 2 * math.pi), HEAVY, name="ring")
     with warns("ring.start (1, 0) and ring.end (1, ", "touch"):
         begin(ring)

@@ -27,8 +27,8 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
 TOUCHING = 1e-3
-"""Largest gap between vertices that touch, as a fraction of the length of the shorter beam; also
-between a load and the end of its route."""
+"""Largest gap between vertices that touch, as a fraction of the length of the shorter beam; a tenth
+of this between an end and a cell.  Also the gap between a load and the end of its route."""
 
 JUMP = 1e-6
 """Largest initial jump without a warning: an angle in rad, or a fraction of the scene's size."""
@@ -233,7 +233,9 @@ def _contacts(points: Array, first: Index) -> tuple[Index, Index, Array]:
     touched = start[cell] + (s > 0.5)
     # Within one beam, only contact of both ends counts.
     apart = (beams[end] != beams[touched]) | (np.isin(touched, ends) & (end < touched))
-    touching = apart & (gap <= np.minimum(reach[end], reach[touched]))
+    # Between vertices, members may pass more closely.
+    part = np.where((s > 0.0) & (s < 1.0), 0.1, 1.0)
+    touching = apart & (gap <= part * np.minimum(reach[end], reach[touched]))
     return end[touching], touched[touching], gap[touching]
 
 
