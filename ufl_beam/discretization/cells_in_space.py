@@ -198,6 +198,19 @@ def rotations_between(before: Array, now: Array) -> Array:
     return np.asarray(v * 2 * np.arctan2(sine, real) / np.where(sine > 0, sine, 1.0))
 
 
+def lost_numbers(numbering: DofNumbering, change: Array, before: Array, now: Array) -> Array:
+    """Return the whole numbers that unknowns of rotations lost after a step of dynamics; (size,).
+
+    The ``change`` of the stored unknowns lacks them; ``before`` and ``now`` are :data:`TURNS`.
+    """
+    dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[: len(now), 3:]
+    half, lost = rotations_between(before, now) / 2, np.zeros_like(change)
+    angle = np.linalg.norm(half, axis=1, keepdims=True)
+    cayley = 2 * half * np.tan(angle) / np.where(angle > 0, angle, 1.0)
+    lost[dofs] = np.rint(cayley - change[dofs])
+    return lost
+
+
 def velocity_in_space(
     numbering: DofNumbering, place: AttachmentPoint, velocities: Vectors, turns: Vectors
 ) -> Array:

@@ -20,6 +20,7 @@ from ufl_beam.discretization.cells_in_space import (
     TURNS,
     CellsOfState,
     cell_axes,
+    lost_numbers,
     momentum_in_space,
     rotated,
     rotation_from,
@@ -285,7 +286,13 @@ class States:
         columns, row = self.row(n)
         if BEFORE in columns.at:
             return columns.column_of(BEFORE, row)
-        return self._row("q", n - 1 if n and self.needs_start else n)
+        if not n or not self.needs_start:
+            return self._row("q", n)
+        q = self._row("q", n - 1)
+        if TURNS in columns.at and "v" in columns.at:
+            change, turns = self._row("q", n) - q, (self.turns(n - 1), self.turns(n))
+            q = q - lost_numbers(self.numbering, change, *turns)
+        return q
 
     def cell_resultants(self, n: int) -> Array:
         """Return resultants of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""
