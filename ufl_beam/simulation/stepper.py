@@ -347,6 +347,8 @@ class Stepper(StateView):
             return
         equation, newton = self.equation, self.solver
         newton.forget_zero_modes()
+        if newton.scale() == 0.0:  # of a path without loads yet
+            return
         if equation.evaluate(self._copy(q1)) and (found := soft_motions(equation)) is not None:
             K, free, _, vectors = found
             x, scales = vectors[:, -1], self.numbering.scales[free]
