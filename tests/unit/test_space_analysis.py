@@ -283,6 +283,20 @@ def test_a_pendulum_hangs_in_statics(turn):
     assert shape[-1, 1] > 0.01
 
 
+def test_modes_of_pendulums_that_may_spin():
+    """[closed] ω² = m g l / J about a ball joint; g / l of a load on a rope, which spins."""
+    weight, g = [ub.Gravity((0, 0, -9.81))], ub.ground(0, 0, 0)
+    top = ub.Body((0, 0, -1), mass=2.0, inertia=(0.3, 0.2, 0.1))
+    swing = ub.Scene(bodies=[top], joints=[ub.Spherical(g, top.at(0, 0, 0))], loads=weight)
+    expected = np.sqrt([0.0, 2 * 9.81 / 2.3, 2 * 9.81 / 2.2])
+    assert ub.modes(swing, 3).omega == pytest.approx(expected, rel=1e-9)
+    hung = ub.Scene(bodies=[top], joints=[ub.Link(g, top.middle)], loads=weight)
+    assert ub.modes(hung, 5).omega == pytest.approx([0.0] * 3 + [9.81**0.5] * 2, rel=1e-9)
+    off = ub.Body((0.6, 0, -0.8), mass=2.0, inertia=(0.3, 0.2, 0.1))
+    with pytest.warns(ub.ModelWarning, match="loads have no effect"):
+        ub.modes(ub.Scene(bodies=[off], joints=[ub.Spherical(g, off.at(0, 0, 0))], loads=weight), 1)
+
+
 # -- paths -----------------------------------------------------------------------------------------
 
 

@@ -201,7 +201,10 @@ class Stepper(StateView):
         comparison: Comparison of the processes if each of them computes the scene as a whole.
         together: Caller of functions on all processes that share the scene; if a function raises
             on one process, it raises on all.
+        may_be_free: True if statics may leave motions free that nothing holds.
     """
+
+    may_be_free = False
 
     def __init__(
         self, comm: MPI.Intracomm, equation: StepEquation, newton: Newton, t: float, q: Array,
@@ -355,6 +358,8 @@ class Stepper(StateView):
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= FREE_STIFFNESS * newton.scale() * self.scene.size * motion:
+                if self.may_be_free:
+                    return
                 said = describe_motions(self.scene, self._of_members(vectors, free))
                 raise ModelError(f"{said}The loads do not hold it either. {INSTEAD}")
         self._free_motion = ""
