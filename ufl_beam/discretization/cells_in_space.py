@@ -61,6 +61,11 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
         inertia = np.zeros((6, 6))
         inertia[range(3), range(3)], inertia[3:, 3:] = body.mass, body.tensor
         np.add.at(A.data, A.positions(np.repeat(own, 6), np.tile(own, 6)), inertia.ravel())
+    subdomain = fields.subdomain
+    for point in subdomain.numbering.scene.masses:
+        along = subdomain.numbering.node(point.place)[:3]
+        mine = subdomain.local(along[subdomain.owns(along)])
+        np.add.at(A.data, A.positions(mine, mine), point.mass)
     return A
 
 
