@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from into_space import EXACT, SKEW, InSpace
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from test_space import OTHER, PLANAR, STIFF
 
@@ -166,6 +167,31 @@ def test_a_square_column_buckles_about_both_axes():
         both.append(ub.buckling(scene, 1).factors[0])
     euler = np.pi**2 * 200.0 / (4 * 13.0**2)
     assert abs(extrapolated(both) / euler - 1) < 2 * euler / 7e3 + 1e-4  # shear
+
+
+def test_buckling_of_a_frame_whose_column_shortens():
+    """[closed] A clamped column, a beam pinned at its far end: the rotation of the corner buckles.
+
+    The beam bends as the column shortens, so that no equilibrium is near the factor.
+    """
+    L, a, EI, found = 1.5, 1.2, 3.0, []
+    section = ub.Section(EA=2e5, GA=8e4, GA3=8e4, EI=EI, EI2=9.0, GJ=5.0)
+    for cells in (16, 32):
+        column = ub.Beam((0, 0, 0), (0, 0, L), section, cells=cells, up=(1, 0, 0))
+        beam = ub.Beam((0, 0, L), (a, 0, L), section, cells=cells)
+        feet = [ub.Clamped(column.start), ub.Pinned(beam.end)]
+        push = ub.PointLoad(column.end, force=(0, 0, -1.0))
+        joints = [ub.Rigid(column.end, beam.start)]
+        frame = ub.Scene([column, beam], joints=joints, supports=feet, loads=[push])
+        found.append(ub.buckling(frame, 2))
+
+    def stiffness(u):  # of the corner, in EI
+        return u * (np.sin(u) - u * np.cos(u)) / (2 - 2 * np.cos(u) - u * np.sin(u)) / L + 3 / a
+
+    P = brentq(stiffness, 4.6, 6.2) ** 2 * EI / L**2
+    coarse, fine = (x.factors[1] for x in found)
+    assert (4 * fine - coarse) / 3 == pytest.approx(P / (1 + P / section.GA), rel=5e-4)
+    assert found[1].errors[1] < 1e-3
 
 
 def test_frequencies_vanish_at_the_buckling_load():

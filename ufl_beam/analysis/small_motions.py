@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 import numpy as np
@@ -29,6 +30,7 @@ V = TypeVar("V", Array, Complex)
 REAL = 1e-6  # imaginary part of a buckling factor that is round-off, as a fraction
 SECOND = 1e-3  # change for second derivatives; rad, or fraction of the size of the scene
 MOST_REFINEMENTS = 20  # largest number of iterations for a buckling factor in space
+LARGEST_CHANGE = 0.02  # largest relative change of a factor beyond half of it, without equilibrium
 REFINED = 1e-8  # change of a buckling factor in the last iteration, as a fraction
 SAME = 1e-6  # difference of factors that may be one, as a fraction
 MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
@@ -241,7 +243,7 @@ class SmallMotions(Linearization):
             except StepFailed:
                 others.append(abs(λ[guess]))
                 continue
-            if new[1] > REFINED:
+            if new[1] > LARGEST_CHANGE:
                 others.append(abs(λ[guess]))
             elif not any(_same(new, other) for other in found):
                 found.append(new)
@@ -253,22 +255,32 @@ class SmallMotions(Linearization):
     def _refined(
         self, λ: float, x: Array, stiffness: Callable[[float], csr_array]
     ) -> tuple[float, float, Array]:
-        """Return a buckling factor near ``λ``, its last relative change, and its shape near x."""
-        before, last, change = 0.0, self.K, 1.0
-        for _ in range(MOST_REFINEMENTS):
+        """Return a buckling factor near ``λ``, its last relative change, and its shape near x.
+
+        Imperfections may end the path of equilibria before the factor, or bend it away.  Then the
+        stiffness at half of ``λ`` and its slope up to there yield the factor.
+        """
+
+        def after(
+            λ: float, x: Array, before: float, last: csr_array
+        ) -> tuple[csr_array, float, Array]:
             K = stiffness(λ)
             slope = (K - last) / (λ - before)
             try:
                 x = splu(K.tocsc()).solve(slope @ x)
             except RuntimeError:  # the stiffness is singular
-                return λ, 0.0, x
+                return K, λ, x
             x /= np.abs(x).max()
-            before, last = λ, K
-            λ -= (x @ (K @ x)) / (x @ (slope @ x))
-            change = abs(λ / before - 1)
-            if change <= REFINED:
-                break
-        return λ, change, x
+            return K, λ - (x @ (K @ x)) / (x @ (slope @ x)), x
+
+        guess, shape, before, last = λ, x, 0.0, self.K
+        with suppress(StepFailed):
+            for _ in range(MOST_REFINEMENTS):
+                before, (last, λ, x) = λ, after(λ, x, before, last)
+                if (change := abs(λ / before - 1)) <= REFINED:
+                    return λ, change, x
+        _, λ, x = after(guess / 2, shape, 0.0, self.K)
+        return λ, abs(λ / guess - 1), x
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.

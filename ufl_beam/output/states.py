@@ -183,12 +183,11 @@ class States:
         self._blocks = [*blocks]
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest `cell_forces`
         if like is not None:
-            self.cells, self.equilibrium_fraction, self.needs_start = (
-                like.cells,
+            self.cells, self.forces_from_record = like.cells, like.forces_from_record
+            self.equilibrium_fraction, self.needs_start = (
                 like.equilibrium_fraction,
                 like.needs_start,
             )
-            self.forces_from_record = like.forces_from_record
 
     # -- rows ----------------------------------------------------------------------------------
 
