@@ -68,6 +68,20 @@ def test_planar_buckling_in_a_turned_plane():
     assert abs(other / one - 1) < 1e-8
 
 
+def test_planar_buckling_of_a_frame_with_unequal_loads():
+    """Differences of the stiffness need loads below the factor; estimates of errors hold."""
+    section = ub.Section(EA=2e6, GA=8e5, EI=300.0)
+    posts = [ub.Beam((x, 0), (x, 3), section, cells=8) for x in (0, 3)]
+    girder = ub.Beam((0, 3), (3, 3), section, cells=6)
+    loads = [ub.PointLoad(x.end, force=(0, -f)) for x, f in zip(posts, (10.0, 3.0), strict=True)]
+    joints = [ub.Rigid(x.end, y) for x, y in zip(posts, (girder.start, girder.end), strict=True)]
+    feet = [ub.Clamped(x.start) for x in posts]
+    plane = ub.Scene([*posts, girder], joints=joints, supports=feet, loads=loads)
+    one, other = ub.buckling(plane, 1), ub.buckling(InSpace(plane, SKEW).scene, 2)
+    (factor,), (_, found) = one.factors, other.factors  # the first one is out of the plane
+    assert abs(found / factor - 1) < one.errors[0] + other.errors[1] < 1e-3
+
+
 L = 2.0
 NARROW = ub.Section(
     EA=1.05e7, GA=3.5e6, GA3=3.5e6, EI=2187.5, EI2=0.875, GJ=1.35, rhoA=0.4, rhoI=8e-5, rhoI2=4e-8
