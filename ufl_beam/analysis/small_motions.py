@@ -249,11 +249,7 @@ class SmallMotions(Linearization):
         for guess in np.flatnonzero(real)[np.argsort(np.abs(λ[real]), kind="stable")]:
             if len(found) == n:
                 break
-            try:
-                new = self._refined(λ[guess].real, x[:, guess].real, stiffness, half)
-            except StepFailed:
-                others.append(abs(λ[guess]))
-                continue
+            new = self._refined(λ[guess].real, x[:, guess].real, stiffness, half)
             if new[1] > LARGEST_CHANGE:
                 others.append(abs(λ[guess]))
             elif not any(_same(new, other) for other in found):
@@ -290,8 +286,10 @@ class SmallMotions(Linearization):
                 before, (last, λ, x) = λ, after(λ, x, before, last)
                 if (change := abs(λ / before - 1)) <= REFINED:
                     return λ, change, x
-        _, λ, x = after(math.copysign(half, guess), shape, 0.0, self.K)
-        return λ, abs(λ / guess - 1), x
+        with suppress(StepFailed):
+            _, λ, x = after(math.copysign(half, guess), shape, 0.0, self.K)
+            return λ, abs(λ / guess - 1), x
+        return guess, math.inf, shape
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
