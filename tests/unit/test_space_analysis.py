@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from into_space import EXACT, SKEW, InSpace
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 from test_space import OTHER, PLANAR, STIFF
 
@@ -65,6 +66,20 @@ def test_planar_buckling_in_a_turned_plane():
     plane = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     one, other = (ub.buckling(x, 1).factors[0] for x in (plane, InSpace(plane, SKEW).scene))
     assert abs(other / one - 1) < 1e-8
+
+
+def test_planar_buckling_of_a_frame_with_unequal_loads():
+    """Differences of the stiffness need loads below the factor; estimates of errors hold."""
+    section = ub.Section(EA=2e6, GA=8e5, EI=300.0)
+    posts = [ub.Beam((x, 0), (x, 3), section, cells=8) for x in (0, 3)]
+    girder = ub.Beam((0, 3), (3, 3), section, cells=6)
+    loads = [ub.PointLoad(x.end, force=(0, -f)) for x, f in zip(posts, (10.0, 3.0), strict=True)]
+    joints = [ub.Rigid(x.end, y) for x, y in zip(posts, (girder.start, girder.end), strict=True)]
+    feet = [ub.Clamped(x.start) for x in posts]
+    plane = ub.Scene([*posts, girder], joints=joints, supports=feet, loads=loads)
+    one, other = ub.buckling(plane, 1), ub.buckling(InSpace(plane, SKEW).scene, 2)
+    (factor,), (_, found) = one.factors, other.factors  # the first one is out of the plane
+    assert abs(found / factor - 1) < one.errors[0] + other.errors[1] < 1e-3
 
 
 L = 2.0
@@ -166,6 +181,31 @@ def test_a_square_column_buckles_about_both_axes():
         both.append(ub.buckling(scene, 1).factors[0])
     euler = np.pi**2 * 200.0 / (4 * 13.0**2)
     assert abs(extrapolated(both) / euler - 1) < 2 * euler / 7e3 + 1e-4  # shear
+
+
+def test_buckling_of_a_frame_whose_column_shortens():
+    """[closed] A clamped column, a beam pinned at its far end: the rotation of the corner buckles.
+
+    The beam bends as the column shortens, so that no equilibrium is near the factor.
+    """
+    L, a, EI, found = 1.5, 1.2, 3.0, []
+    section = ub.Section(EA=2e5, GA=8e4, GA3=8e4, EI=EI, EI2=9.0, GJ=5.0)
+    for cells in (16, 32):
+        column = ub.Beam((0, 0, 0), (0, 0, L), section, cells=cells, up=(1, 0, 0))
+        beam = ub.Beam((0, 0, L), (a, 0, L), section, cells=cells)
+        feet = [ub.Clamped(column.start), ub.Pinned(beam.end)]
+        push = ub.PointLoad(column.end, force=(0, 0, -1.0))
+        joints = [ub.Rigid(column.end, beam.start)]
+        frame = ub.Scene([column, beam], joints=joints, supports=feet, loads=[push])
+        found.append(ub.buckling(frame, 2))
+
+    def stiffness(u):  # of the corner, in EI
+        return u * (np.sin(u) - u * np.cos(u)) / (2 - 2 * np.cos(u) - u * np.sin(u)) / L + 3 / a
+
+    P = brentq(stiffness, 4.6, 6.2) ** 2 * EI / L**2
+    coarse, fine = (x.factors[1] for x in found)
+    assert (4 * fine - coarse) / 3 == pytest.approx(P / (1 + P / section.GA), rel=5e-4)
+    assert found[1].errors[1] < 1e-3
 
 
 def test_frequencies_vanish_at_the_buckling_load():
@@ -281,6 +321,20 @@ def test_a_pendulum_hangs_in_statics(turn):
     weight = 9.81 * (shape[:-1] + shape[1:]) / 2  # of cells of 1 m and 1 kg
     assert abs(weight[:, 1].sum() + 0.1 * shape[-1, 2]) < 1e-9
     assert shape[-1, 1] > 0.01
+
+
+def test_modes_of_pendulums_that_may_spin():
+    """[closed] ω² = m g l / J about a ball joint; g / l of a load on a rope, which spins."""
+    weight, g = [ub.Gravity((0, 0, -9.81))], ub.ground(0, 0, 0)
+    top = ub.Body((0, 0, -1), mass=2.0, inertia=(0.3, 0.2, 0.1))
+    swing = ub.Scene(bodies=[top], joints=[ub.Spherical(g, top.at(0, 0, 0))], loads=weight)
+    expected = np.sqrt([0.0, 2 * 9.81 / 2.3, 2 * 9.81 / 2.2])
+    assert ub.modes(swing, 3).omega == pytest.approx(expected, rel=1e-9)
+    hung = ub.Scene(bodies=[top], joints=[ub.Link(g, top.middle)], loads=weight)
+    assert ub.modes(hung, 5).omega == pytest.approx([0.0] * 3 + [9.81**0.5] * 2, rel=1e-9)
+    off = ub.Body((0.6, 0, -0.8), mass=2.0, inertia=(0.3, 0.2, 0.1))
+    with pytest.warns(ub.ModelWarning, match="loads have no effect"):
+        ub.modes(ub.Scene(bodies=[off], joints=[ub.Spherical(g, off.at(0, 0, 0))], loads=weight), 1)
 
 
 # -- paths -----------------------------------------------------------------------------------------

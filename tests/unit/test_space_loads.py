@@ -360,6 +360,26 @@ def test_a_flight_seen_from_a_rotating_frame():
     assert np.max(errors[1]) < 1e-2
 
 
+def test_a_point_mass_is_a_body_without_rotary_inertia():
+    """In a rotating frame, with weight, of a place on a skew roller; and its modes."""
+    beam = ub.Beam((0, 0, 0), (2, 1, 0.5), SECTION, cells=2)
+    feet = [ub.Pinned(beam.start), ub.Roller(beam.end, along=(1, -1, 2))]
+    loads = [ub.RotatingFrame((0.4, -0.8, 0.6), about=(0, 0, 1)), ub.Gravity((1, 2, -9.81))]
+    ball, found = ub.Body((2, 1, 0.5), mass=3.0), []
+    for parts in (
+        {"masses": [ub.PointMass(beam.end, 2.0), ub.PointMass(beam.end, 1.0)]},
+        {"bodies": [ball], "joints": [ub.Rigid(beam.end, ball.middle)]},
+    ):
+        scene = ub.Scene([beam], supports=feet, loads=loads, **parts)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02, newton=EXACT)
+        shapes = ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], **parts), 4)
+        found.append((run.position(beam.end), run.momentum(), shapes.omega))
+    for one, other in zip(*found, strict=True):
+        assert np.abs(one - other).max() < 1e-11 * np.abs(other).max()
+    with pytest.raises(ub.ModelError, match=re.escape("is that of a Body")):
+        ub.Scene([beam], masses=[ub.PointMass(beam.end, 1.0, 1.0)])
+
+
 def test_whirling_of_a_shaft():
     """Both frequencies of a Rayleigh shaft on bearings, in the frame that turns with it.
 

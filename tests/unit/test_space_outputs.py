@@ -790,7 +790,7 @@ def test_forces_of_joints_change_the_momenta(kind):
     """Impulses of force, moment and weight are the changes of momentum and angular momentum."""
     joint, weight = BEARINGS[kind], 2.0 * np.array([3.0, -9.0, -2.0])
     scene = ub.Scene(bodies=[SWINGING], joints=[joint], loads=[ub.Gravity(tuple(weight / 2))])
-    arguments = {"t": (0, 0.48), "dt": 0.02, **RUN}
+    arguments = {"t": (0, 2.4), "dt": 0.02, **RUN}
     run = ub.simulate(scene, ub.EnergyMomentum(), **arguments)
     found, sign = run.joint(joint), -1.0 if joint.places[1] is ROOT else 1.0
     force, moment = sign * found.force[1:], sign * found.moment[1:]

@@ -345,6 +345,15 @@ def test_only_motions_that_loads_do_not_hold_are_named():
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
 
 
+def test_a_path_with_a_loose_rod_is_refused():
+    """Its first state has no loads, by which the stiffness could be judged."""
+    held, loose = (ub.Beam((x, 0), (x + 1, 0), ROD, cells=4, name=f"{x}") for x in (0, 2))
+    push = ub.PointLoad(held.end, force=(0, 1), amplitude=lambda t: t)
+    feet = [ub.Clamped(held.start), ub.Pinned(loose.start)]
+    with raises("free to move in 1 way", "2 (beam 1) can turn", "loads do not hold it either"):
+        ub.follow(ub.Scene([held, loose], supports=feet, loads=[push]), ub.LoadControl(1.0))
+
+
 def test_a_free_rod_that_is_pulled_is_free():
     """The tension holds its rotation, and nothing its displacement."""
     beam = ub.Beam((0, 0), (1, 0), ROD, cells=4, name="rod")

@@ -43,7 +43,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.time_schemes import Static
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.bodies import AttachmentPoint
+from ufl_beam.model.bodies import GROUND, AttachmentPoint
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
 from ufl_beam.model.loads import Load, RotatingFrame
 from ufl_beam.model.scene import Scene
@@ -378,8 +378,14 @@ def computed_modes(
             simulation = Simulation(undamped, Static(), t0=t0, mesh=mesh)
             # Some scenes have no equilibrium, such as a falling body.
             with suppress(ArgumentError), closing(simulation):
+                simulation.may_be_free = True  # free motions are modes, too
                 simulation.step_to(AT)
                 at = simulation.snapshot()
+            if at is None and (scene.supports or GROUND in scene.rigid_bodies):
+                warn(
+                    "modes: loads have no effect, since no equilibrium under them was found; begin "
+                    "near it, give at=, or leave the loads out"
+                )
         if at is None:
             scene = replace(scene, loads=())  # with loads, this state would be no equilibrium
     small = SmallMotions(scene, at, mesh=mesh)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TypeVar
 
 import numpy as np
@@ -28,7 +29,9 @@ V = TypeVar("V", Array, Complex)
 
 REAL = 1e-6  # imaginary part of a buckling factor that is round-off, as a fraction
 SECOND = 1e-3  # change for second derivatives; rad, or fraction of the size of the scene
+NEAR = 0.2  # largest load of differences in space, as a fraction of the first buckling factor
 MOST_REFINEMENTS = 20  # largest number of iterations for a buckling factor in space
+LARGEST_CHANGE = 0.02  # largest relative change of a factor beyond half of it, without equilibrium
 REFINED = 1e-8  # change of a buckling factor in the last iteration, as a fraction
 SAME = 1e-6  # difference of factors that may be one, as a fraction
 MODAL_TOLERANCE = 1e-9  # coupling below this fraction of the largest damping is neglected
@@ -227,21 +230,27 @@ class SmallMotions(Linearization):
             q1 = static.attempt_along(step, guess, None).q1
             return self._reduced(self._matrix(static.equation.linearize(q1, step)[1]))
 
-        ε = SECOND / np.abs(u * self.numbering.scales).max()
-        K, ends = self.K, [stiffness(sign * ε) for sign in (1.0, -1.0)]
-        slope, bend = (ends[0] - ends[1]) / (2 * ε), (ends[0] + ends[1] - 2 * K) / (2 * ε**2)
-        λ, x = eigensolvers.quadratic_near_zero(K, slope, bend, n)
+        K, ε = self.K, SECOND / np.abs(u * self.numbering.scales).max()
+        λ, x = np.asarray([], complex), np.zeros((K.shape[0], 0), complex)
+        for _ in range(MOST_REFINEMENTS):
+            try:
+                ends = [stiffness(sign * ε) for sign in (1.0, -1.0)]
+            except StepFailed:  # beyond the end of the path
+                ε /= 4
+                continue
+            slope, bend = (ends[0] - ends[1]) / (2 * ε), (ends[0] + ends[1] - 2 * K) / (2 * ε**2)
+            λ, x = eigensolvers.quadratic_near_zero(K, slope, bend, n)
+            if not ε > NEAR * np.abs(λ).min(initial=math.inf) > 0:
+                break
+            ε = NEAR / 2 * np.abs(λ).min()
         real = np.abs(λ.imag) <= REAL * np.abs(λ)
         others, found = [*np.abs(λ[~real])], list[tuple[float, float, Array]]()
+        half = np.abs(λ[real]).min(initial=math.inf) / 2
         for guess in np.flatnonzero(real)[np.argsort(np.abs(λ[real]), kind="stable")]:
             if len(found) == n:
                 break
-            try:
-                new = self._refined(λ[guess].real, x[:, guess].real, stiffness)
-            except StepFailed:
-                others.append(abs(λ[guess]))
-                continue
-            if new[1] > REFINED:
+            new = self._refined(λ[guess].real, x[:, guess].real, stiffness, half)
+            if new[1] > LARGEST_CHANGE:
                 others.append(abs(λ[guess]))
             elif not any(_same(new, other) for other in found):
                 found.append(new)
@@ -251,24 +260,36 @@ class SmallMotions(Linearization):
         return *self._nearest(n, factors, shapes), errors[order], np.array(others)
 
     def _refined(
-        self, λ: float, x: Array, stiffness: Callable[[float], csr_array]
+        self, λ: float, x: Array, stiffness: Callable[[float], csr_array], half: float
     ) -> tuple[float, float, Array]:
-        """Return a buckling factor near ``λ``, its last relative change, and its shape near x."""
-        before, last, change = 0.0, self.K, 1.0
-        for _ in range(MOST_REFINEMENTS):
+        """Return a buckling factor near ``λ``, its last relative change, and its shape near x.
+
+        Imperfections may end the path of equilibria before the factor, or bend it away.  Then the
+        stiffness at half of the first factor and its slope up to there yield the factor.
+        """
+
+        def after(
+            λ: float, x: Array, before: float, last: csr_array
+        ) -> tuple[csr_array, float, Array]:
             K = stiffness(λ)
             slope = (K - last) / (λ - before)
             try:
                 x = splu(K.tocsc()).solve(slope @ x)
             except RuntimeError:  # the stiffness is singular
-                return λ, 0.0, x
+                return K, λ, x
             x /= np.abs(x).max()
-            before, last = λ, K
-            λ -= (x @ (K @ x)) / (x @ (slope @ x))
-            change = abs(λ / before - 1)
-            if change <= REFINED:
-                break
-        return λ, change, x
+            return K, λ - (x @ (K @ x)) / (x @ (slope @ x)), x
+
+        guess, shape, before, last = λ, x, 0.0, self.K
+        with suppress(StepFailed):
+            for _ in range(MOST_REFINEMENTS):
+                before, (last, λ, x) = λ, after(λ, x, before, last)
+                if (change := abs(λ / before - 1)) <= REFINED:
+                    return λ, change, x
+        with suppress(StepFailed):
+            _, λ, x = after(math.copysign(half, guess), shape, 0.0, self.K)
+            return λ, abs(λ / guess - 1), x
+        return guess, math.inf, shape
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.

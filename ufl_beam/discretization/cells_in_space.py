@@ -61,6 +61,11 @@ def mass_matrix_in_space(fields: Fields) -> Csr:
         inertia = np.zeros((6, 6))
         inertia[range(3), range(3)], inertia[3:, 3:] = body.mass, body.tensor
         np.add.at(A.data, A.positions(np.repeat(own, 6), np.tile(own, 6)), inertia.ravel())
+    subdomain = fields.subdomain
+    for point in subdomain.numbering.scene.masses:
+        along = subdomain.numbering.node(point.place)[:3]
+        mine = subdomain.local(along[subdomain.owns(along)])
+        np.add.at(A.data, A.positions(mine, mine), point.mass)
     return A
 
 
@@ -196,6 +201,19 @@ def rotations_between(before: Array, now: Array) -> Array:
     v, real = a * q - b * p - np.cross(p, q), a * b + np.sum(p * q, axis=1, keepdims=True)
     sine = np.linalg.norm(v, axis=1, keepdims=True)
     return np.asarray(v * 2 * np.arctan2(sine, real) / np.where(sine > 0, sine, 1.0))
+
+
+def lost_numbers(numbering: DofNumbering, change: Array, before: Array, now: Array) -> Array:
+    """Return the whole numbers that unknowns of rotations lost after a step of dynamics; (size,).
+
+    The ``change`` of the stored unknowns lacks them; ``before`` and ``now`` are :data:`TURNS`.
+    """
+    dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])[: len(now), 3:]
+    half, lost = rotations_between(before, now) / 2, np.zeros_like(change)
+    angle = np.linalg.norm(half, axis=1, keepdims=True)
+    cayley = 2 * half * np.tan(angle) / np.where(angle > 0, angle, 1.0)
+    lost[dofs] = np.rint(cayley - change[dofs])
+    return lost
 
 
 def velocity_in_space(

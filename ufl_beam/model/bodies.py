@@ -353,7 +353,7 @@ class PointMass(Record):
     Args:
         place: Place to which the mass is fixed: on a beam, or the centre of a body.
         mass: Mass; kg.
-        inertia: Rotary inertia about the place; kg m².
+        inertia: Rotary inertia about the place, in the plane; kg m².
 
     Example:
         >>> heavy = ub.Scene(

@@ -64,7 +64,7 @@ def require_inertia(scene: Scene) -> None:
     masses = [
         (mass.place, component)
         for mass in scene.masses
-        for component, inertia in enumerate((mass.mass, mass.mass, mass.inertia))
+        for component, inertia in enumerate((*[mass.mass] * d, mass.inertia))
         if inertia
     ]
 

@@ -410,7 +410,7 @@ class Scene(Record, Rich):
 
 IN_SPACE = (
     *(Beam, Body, *joints.IN_SPACE, *connectors.IN_SPACE, *supports.SUPPORTS, *LOADS),
-    *(Velocity, KelvinVoigt),
+    *(PointMass, Velocity, KelvinVoigt),
 )
 """Classes of the objects of scenes in space."""
 
@@ -427,6 +427,10 @@ def require_space(scene: Scene) -> None:
             )
         if isinstance(record, MovingLoad) and record.mass:
             raise ModelError(f"{record}: masses that move along beams are for scenes in the plane")
+        if isinstance(record, PointMass) and record.inertia:
+            raise ModelError(
+                f"{record._label()}: rotary inertia in space is that of a Body; join one by Rigid"
+            )
     for beam in scene.beams:
         section = beam.section
         names = "GA3", "EI2", "GJ", *(("rhoI2",) if section.rhoI else ())

@@ -20,6 +20,7 @@ from ufl_beam.discretization.cells_in_space import (
     TURNS,
     CellsOfState,
     cell_axes,
+    lost_numbers,
     momentum_in_space,
     rotated,
     rotation_from,
@@ -182,12 +183,11 @@ class States:
         self._blocks = [*blocks]
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest `cell_forces`
         if like is not None:
-            self.cells, self.equilibrium_fraction, self.needs_start = (
-                like.cells,
+            self.cells, self.forces_from_record = like.cells, like.forces_from_record
+            self.equilibrium_fraction, self.needs_start = (
                 like.equilibrium_fraction,
                 like.needs_start,
             )
-            self.forces_from_record = like.forces_from_record
 
     # -- rows ----------------------------------------------------------------------------------
 
@@ -285,7 +285,13 @@ class States:
         columns, row = self.row(n)
         if BEFORE in columns.at:
             return columns.column_of(BEFORE, row)
-        return self._row("q", n - 1 if n and self.needs_start else n)
+        if not n or not self.needs_start:
+            return self._row("q", n)
+        q = self._row("q", n - 1)
+        if TURNS in columns.at and "v" in columns.at:
+            change, turns = self._row("q", n) - q, (self.turns(n - 1), self.turns(n))
+            q = q - lost_numbers(self.numbering, change, *turns)
+        return q
 
     def cell_resultants(self, n: int) -> Array:
         """Return resultants of cells, ``cell_number`` of loops.h, in a state; (9, num_cells)."""

@@ -201,7 +201,10 @@ class Stepper(StateView):
         comparison: Comparison of the processes if each of them computes the scene as a whole.
         together: Caller of functions on all processes that share the scene; if a function raises
             on one process, it raises on all.
+        may_be_free: True if statics may leave motions free that nothing holds.
     """
+
+    may_be_free = False
 
     def __init__(
         self, comm: MPI.Intracomm, equation: StepEquation, newton: Newton, t: float, q: Array,
@@ -347,12 +350,16 @@ class Stepper(StateView):
             return
         equation, newton = self.equation, self.solver
         newton.forget_zero_modes()
+        if newton.scale() == 0.0:  # of a path without loads yet
+            return
         if equation.evaluate(self._copy(q1)) and (found := soft_motions(equation)) is not None:
             K, free, _, vectors = found
             x, scales = vectors[:, -1], self.numbering.scales[free]
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= FREE_STIFFNESS * newton.scale() * self.scene.size * motion:
+                if self.may_be_free:
+                    return
                 said = describe_motions(self.scene, self._of_members(vectors, free))
                 raise ModelError(f"{said}The loads do not hold it either. {INSTEAD}")
         self._free_motion = ""
