@@ -77,6 +77,7 @@ def test_adaptive_steps_do_not_depend_on_the_statement(seed):
         assert difference(one, other) < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:modes. loads have no effect")  # of parts that fall
 @pytest.mark.parametrize("damping", [(), (ub.Rayleigh(mass=0.3, stiffness=1e-3),)])
 @pytest.mark.parametrize("seed", range(0, 36, 3))
 def test_modes_do_not_depend_on_units_and_axes(seed, damping):
