@@ -249,7 +249,8 @@ def derivative(one, solution):
         errors.append(np.abs(d - exact).max() / size)
         if errors[-1] < max(1e-6, 3e-12 / h):  # differences lose digits
             return
-    runs = [ub.simulate(model(1.0 + x), one.scheme, **arguments) for x in (-1e-9, 1e-9)]
+    near = (h * k for h in (1e-9, 1e-8, 1e-7) for k in (-2, -1, 1, 2))
+    runs = [ub.simulate(model(1.0 + x), one.scheme, **arguments) for x in near]
     pieces = {found.solution.substeps, *(s.substeps for s in runs)}
     assert len(pieces) > 1, f"derivatives {min(errors):.1e}"  # else steps are cut elsewhere
 
