@@ -82,7 +82,7 @@ def warn_of_rates(scene: Scene) -> None:
 def warn_of_loads(scene: Scene, t: tuple[float, float], ends: Array) -> None:
     """Warn of moving loads that are missed or have no weight, and of large gaps.
 
-    ``ends`` (s) are those of equal steps, empty for adaptive steps.
+    ``ends`` has the beginning and the ends of equal steps (s); it is empty for adaptive steps.
     """
     heavy = any(isinstance(load, Gravity) for load in scene.loads)
     for connector in scene.connectors:

@@ -206,8 +206,8 @@ class Extremes(Restartable):
     substeps.  Memory does not grow with the number of steps.  Section forces are evaluated at
     equally spaced points of each cell, both ends included, as in :meth:`Solution.diagram`.  During
     a run, processes that share the scene have the extremes up to the end of the last whole step.
-    In space Python updates the extremes after each whole step, and rotations are those of
-    :meth:`Solution.displacement`.
+    In space Python updates the extremes after each whole step; rotations are rotation vectors, as
+    :meth:`Solution.displacement` returns them.
 
     Args:
         points: Number of points of a cell, at least 2.

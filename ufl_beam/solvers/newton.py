@@ -61,7 +61,8 @@ REASONS = {
 
 
 TIGHT = 1e-12
-"""Largest tolerance at which steps of dynamics keep digits that positions lose; 3 % of the time."""
+"""Largest tolerance at which steps of dynamics keep the digits that large displacements lose; this
+takes 3 % of the time of a step in the plane."""
 
 
 def _vector(subdomain: Subdomain) -> tuple[PETSc.Vec, Array]:

@@ -98,8 +98,8 @@ class Fragility(NamedTuple):
         im, z, n = (require_row(row, f"Fragility.fit: {name}") for name, row in rows)
         if not (0 < len(im) == len(z) == len(n) and (im > 0).all() and ((z >= 0) & (z <= n)).all()):
             raise ArgumentError(
-                "Fragility.fit: intensities must be positive, their number that of the counts, "
-                "and exceeded must be from 0 to number"
+                "Fragility.fit: intensities must be positive, one for each count, and exceeded "
+                "must be from 0 to number"
             )
         some, others = im[z > 0], im[z < n]
         said = ""
