@@ -429,7 +429,7 @@ def require_space(scene: Scene) -> None:
             raise ModelError(f"{record}: masses that move along beams are for scenes in the plane")
         if isinstance(record, PointMass) and record.inertia:
             raise ModelError(
-                f"{record._label()}: in space only a Body has rotary inertia; join a Body to the place by Rigid"
+                f"{record._label()}: in space only a Body has rotary inertia; join a Body by Rigid"
             )
     for beam in scene.beams:
         section = beam.section
