@@ -458,7 +458,7 @@ typedef struct {
   void *left, *factors, *left_f, *left_x; /* in PETSc: reduced system, its factors, two vectors */
   void *snes, *x, *f, *y;                 /* in PETSc: solver; unknowns, residual, change */
   double *unknowns, *residual, *change;   /* local values of these; others use `change` between solutions */
-  double *low; /* what the iterate lost by round-off in this step, see move_to; or none */
+  double *low; /* sum of the round-off of the iterate in this step, see move_to; or none */
   double *found;         /* solution of the reduced system; in PETSc the entries of left_x */
   const double *weight;  /* see Solver */
   int least, most;                             /* numbers of iterations */
