@@ -177,7 +177,10 @@ class Block(LoadTerm):
         first = functions + len(more if statement.rates else OF_STEP[: lib.NUMBERS_OF_STEP])
         of_group = [first + shares * np.asarray(elements.groups) + i for i in range(shares)]
         index = more | {**elements.of_step} | dict(zip(statement.shared, of_group, strict=True))
-        from_ = [np.broadcast_to(index[x], n) for x in (*statement.of_step, *statement.shared)]
+        names = *statement.of_step, *statement.shared
+        from_ = np.empty((len(names), n), dtype=np.int32)
+        for row, name in zip(from_, names, strict=True):
+            row[:] = index[name]
         self._of_step = first + shares * groups
         of_groups = np.broadcast_to(elements.groups, n)[: n if shares else 0]
         after = width - modes - len(from_)
@@ -213,7 +216,7 @@ class Block(LoadTerm):
             when=np.array([TIMES.index(x.when) for x in in_time], dtype=np.int32), t=self._t,
             begun=self._begun,
             now=self._times[0], end=self._times[1], before=self._times[2],
-            **{"from": in_batches(np.array(from_, dtype=np.int32).reshape(len(from_), n).T, BATCH)},
+            **{"from": in_batches(from_.T, BATCH)},
             state=self._states, w=self._w, out=self._out,
             space=np.zeros(3 * motions + 2 + width + max(made.most, table)),
             each=self._each[0],

@@ -11,6 +11,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -121,7 +122,7 @@ class OnConnector(Statement):
         """True for motions of :data:`SPATIAL_MOTIONS`."""
         return self.motions[0] in SPATIAL_MOTIONS
 
-    @property
+    @cached_property
     def unknowns(self) -> list[str]:
         """See the base class."""
         forces = [f"force{k}" for k in range(self.laws)]
@@ -132,7 +133,7 @@ class OnConnector(Statement):
         """See the base class."""
         return len(self.motions)
 
-    @property
+    @cached_property
     def data(self) -> Data:
         """Data of the law."""
         return Data()
@@ -144,14 +145,14 @@ class OnConnector(Statement):
         """
         return [0.0] * len(self.data.numbers), None
 
-    @property
+    @cached_property
     def numbers(self) -> list[str]:
         """Parameters of the law; geometry of each motion, if it depends on places."""
         moving = (k for k, motion in enumerate(self.motions) if motion not in WITHOUT_PLACES)
         places = PLACES_IN_SPACE if self.in_space else PLACES
         return [*self.data.numbers, *(f"{name} {k}" for k in moving for name in places)]
 
-    @property
+    @cached_property
     def state(self) -> list[str]:
         """Forces at the end of the last step, if they are in the work of a step; variables.
 
@@ -162,7 +163,7 @@ class OnConnector(Statement):
         turns += [x for k in range(2 * self.in_space) for x in quaternion_names(k)]
         return [*(f"force {k}" for k in range(before * self.laws)), *self.data.variables, *turns]
 
-    @property
+    @cached_property
     def recorded(self) -> dict[str, int]:
         """See the base class."""
         kinds = RECORDED | {**self.data.recorded}
@@ -356,23 +357,26 @@ class ConnectorBlock(Block):
         subdomain, scene = setting.subdomain, setting.scene
         self.statement: OnConnector
         k, self._of_kind = statement.laws, all_connectors
-        mine = np.flatnonzero(np.isin(subdomain.connectors, all_connectors))
+        has_statement = np.zeros(len(scene.all_connectors), dtype=bool)
+        has_statement[all_connectors] = True
+        mine = np.flatnonzero(has_statement[subdomain.connectors])
         self.indices: Index = subdomain.connectors[mine]
         self.connectors: list[Connector] = [scene.all_connectors[i] for i in self.indices]
         dofs = subdomain.connector_dofs[mine].astype(np.int32)
         self.forces_at: Index = dofs[:, -1]
         moving = [j for j, x in enumerate(statement.motions) if x not in WITHOUT_PLACES]
         of_kind = [scene.all_connectors[i] for i in all_connectors]
+        values = [statement.values(c, setting) for c in of_kind]
+        positions = np.searchsorted(all_connectors, self.indices)
         numbers = [
-            [*statement.values(self.connectors[i], setting)[0], *(
+            [*values[positions[i]][0], *(
                 x for c in (self.connectors[i + j] for j in moving)
                 for x in geometry_of(c)
             )]
             for i in range(0, len(mine), k)
         ]  # fmt: skip
         self.law: Any = of_kind[0].law
-        in_time = [x for c in of_kind if (x := statement.values(c, setting)[1]) is not None]
-        positions = np.searchsorted(all_connectors, self.indices)
+        in_time = [x for _, x in values if x is not None]
         elements = Elements(
             statement.data.name or type(statement).__name__, self.indices[::k],
             np.column_stack([dofs[::k, :-1], self.forces_at.reshape(-1, k)]),

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -266,7 +267,7 @@ class OfFunctions(OnConnector):
     variables: int
     of_step = "dt", "wanted"
 
-    @property
+    @cached_property
     def data(self) -> Data:
         """See the base class; "e" is the motion."""
         variables = *(f"state {k}" for k in range(self.variables)), "energy", "e"

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import ufl
@@ -64,7 +65,7 @@ class Rubbing(OnConnector):
         of_rest = [f"rates 0 {j}" for j in range(3)] if self.rates else []
         return ["dt", *of_rest, *["wanted"] * (self.prototype is None)]
 
-    @property
+    @cached_property
     def data(self) -> Data:
         """See the base class."""
         more, last = ["tiny", "softness"], {"last slip": 0.0}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -57,7 +58,7 @@ class OnCurve(OnConnector):
         """Names of the numbers of the curve."""
         return [f"number {i}" for i in range(self.count)]
 
-    @property
+    @cached_property
     def data(self) -> Data:
         """See the base class: place; round-off (m); parameter and point after the last step."""
         numbers = ["x", "y", "round-off", *([] if self.tabulated else self.of_curve)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class OfEnergy(OnConnector):
         """See the base class."""
         return replace(self, constant=bool(self.prototype.variables))
 
-    @property
+    @cached_property
     def data(self) -> Data:
         """See the base class."""
         recorded = {} if self.elastic else {"dissipated": lib.RECORDED_TOTAL}

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ class Hinged(OnConnector):
     of_step = ("dt",)
     modes = ("direction",)  # of slip, or 0
 
-    @property
+    @cached_property
     def data(self) -> Data:
         """See the base class."""
         state = "slipped", "start", "limit", "back force", "last direction"

@@ -362,7 +362,7 @@ class Statement(ABC):
         motions = [f"{c}{k}" for c in COMPONENTS for k in range(self.nodes)]
         return [*motions, *(f"force{k}" for k in range(self.laws))]
 
-    @property
+    @cached_property
     def inputs(self) -> list[str]:
         """Names of all inputs, in the order of the columns of an element."""
         groups = "q1", "q0", *(f"rate{j + 1}" for j in range(self.rates))

@@ -136,60 +136,60 @@ class Solver:
 
     def _make_snes(self) -> None:
         chosen = {**database(), **self._newton.petsc}
-        ksp, snes = PETSc.KSP().create(self._x.comm), PETSc.SNES().create(self._x.comm)
+        c, snes = self.c, PETSc.SNES().create(self._x.comm)
+        self._snes, self._objects = snes, [snes, self._x]
+        c.snes, c.searches = opaque(snes), "snes_linesearch_type" not in chosen
+        petsc("SNESSetFunction", snes, self._f, *loop("snes_function", c))
+        snes.setSolution(self._x)  # monitors of paths need it before a solution by SNES
+        if chosen:
+            self._use_petsc(chosen)
+            return
+        self._free_pattern()
+        snes.setType("shell")
+        solve, context = loop("snes_newton", c)
+        petsc("SNESShellSetContext", snes, context)
+        petsc("SNESShellSetSolve", snes, solve)
+
+    def _free_pattern(self) -> None:
+        self._equation.A.free()
+        give_back_memory(self._subdomain.size)
+
+    def _use_petsc(self, chosen: dict[str, Any]) -> None:
+        """Let PETSc's own method ``newtonls`` solve, with the chosen options."""
+        c, snes, ksp = self.c, self._snes, PETSc.KSP().create(self._x.comm)
+        c.monitored = 1
+        if c.low:
+            self._low[:], c.low = 0.0, ffi.NULL
         for x in (ksp, snes):
             x.setOptionsPrefix(PREFIX)
         ksp.setType("preonly")
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(self._factors)
-        c, self._snes = self.c, snes
-        c.snes, c.monitored = opaque(snes), bool(chosen)
-        c.searches = "snes_linesearch_type" not in chosen
-        petsc("SNESSetFunction", snes, self._f, *loop("snes_function", c))
-        snes.setSolution(self._x)  # monitors of paths need it before a solution by SNES
+        if self._subdomain.alone:
+            matrix = self._equation.A.petsc()
+        else:  # only the preconditioner needs a matrix, and it has its own
+            self._free_pattern()
+            sizes = (self._subdomain.num_owned, self._subdomain.numbering.size)
+            matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._subdomain.comm)
+            matrix.setUp()
+        self._objects.append(matrix)
+        petsc("SNESSetJacobian", snes, matrix, matrix, *loop("snes_jacobian", c))
         petsc("SNESSetConvergenceTest", snes, *loop("snes_test", c), ffi.NULL)
-        self._set_jacobian()
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(ksp)
         apply_options(snes, {**FULL_STEPS, **chosen})
-        if not c.monitored:
-            snes.setType("shell")
-            solve, context = loop("snes_newton", c)
-            petsc("SNESShellSetContext", snes, context)
-            petsc("SNESShellSetSolve", snes, solve)
-
-    def _set_jacobian(self) -> None:
-        """Give SNES a PETSc matrix if PETSc's own Newton method needs it, else an empty matrix."""
-        if self._subdomain.alone and self.c.monitored:
-            self._matrix = self._equation.A.petsc()
-        else:
-            # Only the preconditioner needs a matrix, and it has its own.
-            self._equation.A.free()
-            give_back_memory(self._subdomain.size)
-            sizes = (self._subdomain.num_owned, self._subdomain.numbering.size)
-            self._matrix = PETSc.Mat().createPython(
-                [sizes, sizes], object(), comm=self._subdomain.comm
-            )
-            self._matrix.setUp()
-        matrices = self._matrix, self._matrix
-        petsc("SNESSetJacobian", self._snes, *matrices, *loop("snes_jacobian", self.c))
 
     @property
     def snes(self) -> PETSc.SNES:
         """SNES of the steps; reading it switches to PETSc's method ``newtonls``."""
         if not self.c.monitored:
-            self.c.monitored = 1
-            if self.c.low:
-                self._low[:], self.c.low = 0.0, ffi.NULL
-            self._set_jacobian()
-            self._snes.setType("newtonls")
-            apply_options(self._snes, FULL_STEPS)  # setType has reset the line search
+            self._use_petsc({})
         return self._snes
 
     def destroy(self) -> None:
         """Destroy the PETSc objects."""
-        for x in (self._snes, self._x, self._matrix):
+        for x in self._objects:
             x.destroy()
 
     # -- callbacks of C --------------------------------------------------------------------------
