@@ -8,14 +8,8 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.blocks.block import BlockSetting
-from ufl_beam.blocks.connectors import (
-    ConnectorBlock,
-    Damped,
-    Driven,
-    Held,
-    OnConnector,
-    Pushed,
-)
+from ufl_beam.blocks.connectors import ConnectorBlock, OnConnector
+from ufl_beam.blocks.dampers_and_motors import Damped, Driven, Held, Pushed
 from ufl_beam.blocks.force_laws import FunctionBlock, OfFunctions
 from ufl_beam.blocks.friction import Rubbing
 from ufl_beam.blocks.guides import GuideBlock, OnCurve

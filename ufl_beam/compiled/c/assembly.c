@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Assembly: values of forms on cells into vectors and matrices, one cell at a time, and the pattern of
- * a matrix. Cells of one form are assembled several at a time by assembly_simd.c. */
+/* Assembly: values of forms on cells into vectors and matrices, one cell at a time. In most runs
+ * assembly_simd.c inserts the cells of a form, several at a time. */
 
 /* Inputs of a cell from `at` on, c->batch_size apart from each other. c->batch_size is a power of two,
  * so cell & -lanes cells come before the batch of the cell. */

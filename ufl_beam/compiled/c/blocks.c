@@ -54,8 +54,6 @@ static void set_mode(const element_block *b, int mode, double value)
     for (int l = 0; l < b->lanes; ++l) input(b, c, b->width - b->modes + mode)[l] = value;
 }
 
-/* Whether predictions of cells follow the motion since the latest tangent; part of the change of imposed strains in
- * the step that they contain. */
 /* Write the configuration q into the motions of elements, from the input `first` on. */
 static void gather(const element_block *b, const double *q, int first)
 {
@@ -76,6 +74,8 @@ static void gather(const element_block *b, const double *q, int first)
   }
 }
 
+/* Whether predictions of cells follow the motion since the latest tangent; part of the change of imposed strains in
+ * the step that they contain. */
 static void set_prediction(const element_block *b, const double *q, int moved, double reached)
 {
   const predicted_forces *p = b->predicted;
