@@ -266,26 +266,19 @@ class Representatives(dict[NodeDof, NodeDof]):
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
     """Return a representative for each set of degrees of freedom that ``groups`` make equal."""
-    # Each node is hashed once and gets a number, because hashing takes most of the time.
-    number: dict[Node, int] = {}
-    dofs: dict[int, NodeDof] = {}
-    parent: dict[int, int] = {}
+    found = Representatives()
 
-    def root(k: int) -> int:
-        while (above := parent.get(k)) is not None:
-            k = above
-        return k
+    def root(dof: NodeDof) -> NodeDof:
+        while (above := found[dof]) is not dof:
+            dof = above
+        return dof
 
-    for group in groups:
-        indices = [
-            6 * number.setdefault(moved, len(number)) + component for moved, component in group
-        ]
-        dofs.update(zip(indices, group, strict=True))
-        for x in indices[1:]:
-            a, b = root(indices[0]), root(x)
-            if a != b:
-                parent[b] = a
-    return Representatives((dofs[k], dofs[root(above)]) for k, above in parent.items())
+    for first, *others in groups:
+        base = root(first)
+        for x in others:
+            if (other := root(x)) != base:
+                found[other] = base
+    return Representatives((dof, root(above)) for dof, above in found.items())
 
 
 def node(place: AttachmentPoint) -> Node:
