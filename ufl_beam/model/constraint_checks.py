@@ -171,9 +171,9 @@ def friction_repeats(scene: Scene) -> bool:
 def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:
     """Find linearly dependent constraints of connectors and of supports in rotated axes.
 
-    With ``friction``, sticking friction is a constraint, too.  The results are candidates, which
-    are constraints with their owners, and a matrix, whose columns have factors of combinations of
-    candidates that vanish.  Constraints that alone act on a degree of freedom are left out.
+    With ``friction``, sticking friction is a constraint, too.  The results are constraints
+    with their owners, and a matrix, whose columns have factors of combinations of constraints that
+    vanish.
     """
 
     def holds(connector: Connector) -> bool:
@@ -186,27 +186,11 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     turned = (support for support in scene.supports if support.turns)
     rows, fixed = [*_rows(scene, holds, turned)], _fixed(scene)
     combined = [_gradient(scene, row, fixed) for _, row in rows]
-    rows_at: dict[Unknown, set[int]] = defaultdict(set)
+    columns: dict[Unknown, Entries] = defaultdict(list)
     for number, gradient in enumerate(combined):
-        for dof in gradient:
-            rows_at[dof].add(number)
-    left = set(range(len(rows)))
-    alone = [dof for dof, indices in rows_at.items() if len(indices) == 1]
-    while alone:
-        for number in rows_at[alone.pop()] & left:
-            left.discard(number)
-            for dof in combined[number]:
-                rows_at[dof].discard(number)
-                if len(rows_at[dof]) == 1:
-                    alone.append(dof)
-    if not left:
-        return [], np.zeros((0, 0))
-    indices = sorted(left)
-    columns: dict[Unknown, Entries] = defaultdict(list)  # of the gradients that are left
-    for i, number in enumerate(indices):
-        for dof, factor in combined[number].items():
-            columns[dof].append((i, factor))
-    return [rows[number] for number in indices], _null_space([*columns.values()], len(indices))
+        for dof, factor in gradient.items():
+            columns[dof].append((number, factor))
+    return rows, _null_space([*columns.values()], len(rows))
 
 
 def _gradient(scene: Scene, row: Row, fixed: set[Unknown]) -> dict[Unknown, float]:
