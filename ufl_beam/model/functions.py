@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, singledispatch
@@ -163,28 +163,24 @@ class Spline(GuideCurve):
         object.__setattr__(self, "s", s)
 
     @cached_property
+    def _cubics(self) -> Any:
+        return scipy.interpolate.CubicSpline(self.s, self.points)
+
+    @property
     def table(self) -> Array:
         """Begin of each segment, and coefficients of powers of s from it in x, y; (n, 9)."""
-        cubics = scipy.interpolate.CubicSpline(self.s, self.points).c[::-1]
-        return np.column_stack([self.s[:-1], cubics.transpose(1, 2, 0).reshape(-1, 8)])
-
-    def _segment(self, s: float) -> int:
-        return min(max(bisect_right(self.s, s) - 1, 0), len(self.s) - 2)
+        powers = self._cubics.c[::-1].transpose(1, 2, 0).reshape(-1, 8)
+        return np.column_stack([self.s[:-1], powers])
 
     def at(self, s: float) -> Array:
         """See the base class."""
-        begin, *numbers = self.table[self._segment(s)]
-        (a, b, c, d), u = np.reshape(numbers, (2, 4)).T, s - begin
-        return np.array(
-            [a + u * (b + u * (c + u * d)), b + u * (2 * c + u * 3 * d), 2 * c + u * 6 * d]
-        )
+        return np.array([self._cubics(s, order) for order in range(3)])
 
     def __call__(self, s: float) -> Point:
         """Return the point at a parameter, m; exact at given parameters."""
-        for k in (self._segment(s), self._segment(s) + 1):
-            if s == self.s[k]:
-                return self.points[k]
-        x, y = self.at(s)[0].tolist()
+        if s in self.s:
+            return self.points[self.s.index(s)]
+        x, y = self._cubics(s).tolist()
         return x, y
 
 
