@@ -10,6 +10,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
+from operator import add
 from typing import Annotated, Any
 
 import numpy as np
@@ -42,7 +43,7 @@ def _require_law(law: Any, what: str) -> None:
 LawField = Annotated[Law, _require_law]
 """Type of a field with the law of a connector."""
 
-Factors = tuple[float, float, float]
+Factors = tuple[float, ...]
 """Derivatives of a relative motion with respect to (u, v, ψ) of a node."""
 
 
@@ -148,30 +149,38 @@ class Connector(Record, ABC):
 
         In space they are derivatives by the displacement and the rotation about x, y and z.
         """
-        if len(self.apart) == 3:
-            return self._rigidly_in_space()
-        if self.is_rotation:
-            return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
-        (dx, dy), length = self.apart, math.hypot(*self.apart)
-        x, y = (dx / length, dy / length) if self.stretches else self.axis
-        (ax, ay), (bx, by) = self.arms
-        turned_with_a = x * dy - y * dx if self.follows_a else 0.0
-        # If the axis turns with a, d(axis·d)/dψ = (W axis)·d = -y dx + x dy
-        return (-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by)
-
-    def _rigidly_in_space(self) -> tuple[Any, Any]:
-        n, (arm_a, arm_b) = np.array(self.axis), self.arms
+        in_plane = len(self.apart) == 2
+        apart, arm_a, arm_b, n = ([*x, 0.0][:3] for x in (self.apart, *self.arms, self.axis))
         if self.stretches:
-            n = np.array(self.apart) / math.hypot(*self.apart)
+            n = [x / math.hypot(*apart) for x in apart]
+        if self.follows_a:  # the axis turns about a
+            arm_a = [*map(add, arm_a, apart)]
+        a, b = (*n, *_cross(arm_a, n)), (*n, *_cross(arm_b, n))
         if self.is_rotation:
-            torque = n if self.motion == "turning" else np.cross(self.other, n)
-            return (0.0, 0.0, 0.0, *-torque), (0.0, 0.0, 0.0, *torque)
-        with_a = np.cross(n, self.apart) if self.follows_a else np.zeros(3)
-        return (*-n, *(with_a - np.cross(arm_a, n))), (*n, *np.cross(arm_b, n))
+            axis = n if self.motion == "turning" else _cross(self.other, n)
+            a = b = (0.0, 0.0, 0.0, *((0.0, 0.0, 1.0) if in_plane else axis))
+        unknowns = (0, 1, 5) if in_plane else range(6)
+        return tuple(-a[i] for i in unknowns), tuple(b[i] for i in unknowns)
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> tuple[float, ...]:
+    (x, y, z), (u, v, w) = a, b
+    return y * w - z * v, z * u - x * w, x * v - y * u
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Turn(Connector):
+class _OfScene(Connector):
+    """Base of the connectors of ``Scene(connectors=)``."""
+
+    a: PlaceField
+    b: PlaceField
+    law: LawField
+    _: KW_ONLY
+    name: Text = ""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Turn(_OfScene):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     In space, the motion is the component of the rotation vector along an ``axis`` that is fixed in
@@ -185,12 +194,7 @@ class Turn(Connector):
         True
     """
 
-    a: PlaceField
-    b: PlaceField
-    law: LawField
-    _: KW_ONLY
     axis: Any = (1.0, 0.0)
-    name: Text = ""
     motion = "turning"
 
     def __post_init__(self) -> None:
@@ -202,8 +206,8 @@ class Turn(Connector):
             object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Turn"))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Stretch(Connector):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Stretch(_OfScene):
     """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
@@ -214,11 +218,6 @@ class Stretch(Connector):
         >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
 
-    a: PlaceField
-    b: PlaceField
-    law: LawField
-    _: KW_ONLY
-    name: Text = ""
     motion = "stretching"
 
     def __post_init__(self) -> None:
@@ -226,8 +225,8 @@ class Stretch(Connector):
         require_apart(self)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Slide(Connector):
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Slide(_OfScene):
     """Connector of the displacement of ``b`` along an axis that turns with ``a``; m, N.
 
     Args:
@@ -245,12 +244,7 @@ class Slide(Connector):
         >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
 
-    a: PlaceField
-    b: PlaceField
-    law: LawField
-    _: KW_ONLY
     axis: Point = None  # type: ignore[assignment]  # replaced by a unit vector
-    name: Text = ""
     motion = "sliding"
 
     def __post_init__(self) -> None:
@@ -259,7 +253,7 @@ class Slide(Connector):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Bushing(Connector):
+class Bushing(_OfScene):
     """Connector of two or three components of the motion of ``b`` relative to ``a``.
 
     The first component is the displacement along an axis that turns with ``a``, the second the
@@ -286,12 +280,9 @@ class Bushing(Connector):
         0.001
     """
 
-    a: PlaceField
-    b: PlaceField
     law: Annotated[ConnectorLaw, _require_law]
     _: KW_ONLY
     axis: Vector = (1.0, 0.0)
-    name: Text = ""
     motion = "sliding"
 
     def __post_init__(self) -> None:
