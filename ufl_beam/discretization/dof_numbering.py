@@ -153,7 +153,7 @@ class DofNumbering:
         pairs = [
             (width * at(first) + k, width * at(second) + k)
             for (first, c), (second, _) in self.scene.representatives.items()
-            for k in self.components(c)
+            for k in self.scene.components(c)
         ]
         ones, others = np.reshape(np.array(pairs, dtype=np.int64), (-1, 2)).T
         slots[ones] = others
@@ -174,10 +174,6 @@ class DofNumbering:
         # the connected nodes are eliminated.
         self.multipliers: Index = len(order) + np.arange(len(self.scene.all_connectors))
         self.size = len(order) + len(self.multipliers)
-
-    def components(self, component: int) -> tuple[int, ...]:
-        """Return the unknowns of a node for a component, see :meth:`Scene.components`."""
-        return self.scene.components(component)
 
     def agrees(self, numbering: DofNumbering) -> bool:
         """Return whether ``numbering`` has the same beams, points and degrees of freedom."""

@@ -18,6 +18,23 @@ SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
 """Largest difference between a scaled matrix that counts as symmetric and its transpose."""
 
 
+def scaled(A: csr_array) -> tuple[csr_array, Array]:
+    """Return a matrix with rows and columns scaled to largest entries of about one, and factors.
+
+    Ruiz's iteration; the factors, (size,), are powers of two, so that nothing is rounded.
+    """
+    rows, sizes = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr)), np.abs(A.data)
+    scale = np.ones(A.shape[0])
+    for _ in range(SCALINGS):
+        now, largest = sizes * scale[rows] * scale[A.indices], np.zeros_like(scale)
+        np.maximum.at(largest, rows, now)
+        np.maximum.at(largest, A.indices, now)
+        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
+    scale = np.exp2(np.round(np.log2(scale)))
+    values = A.data * (scale[rows] * scale[A.indices])
+    return csr_array((values, A.indices, A.indptr), shape=A.shape), scale
+
+
 class Factorization:
     """L D Lᵀ factors of a symmetric matrix, or L U factors of an unsymmetric one, by MUMPS.
 
@@ -36,16 +53,7 @@ class Factorization:
     def __init__(self, A: csr_array) -> None:
         if not np.isfinite(A.data).all():
             raise np.linalg.LinAlgError("the matrix has no inverse")
-        rows, sizes = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr)), np.abs(A.data)
-        scale = np.ones(A.shape[0])
-        for _ in range(SCALINGS):  # Ruiz's iteration
-            scaled, largest = sizes * scale[rows] * scale[A.indices], np.zeros_like(scale)
-            np.maximum.at(largest, rows, scaled)
-            np.maximum.at(largest, A.indices, scaled)
-            scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
-        self._scale = np.exp2(np.round(np.log2(scale)))  # powers of two: no rounding
-        scaled = A.data * (self._scale[rows] * self._scale[A.indices])
-        S = csr_array((scaled, A.indices, A.indptr), shape=A.shape)
+        S, self._scale = scaled(A)
         self.symmetric = bool(abs(S - S.T).max() <= SYMMETRIC)
         self._S = csr_array((S + S.T) / 2) if self.symmetric else S
         self._pc = pc = PETSc.PC().create(PETSc.COMM_SELF)

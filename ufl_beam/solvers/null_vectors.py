@@ -6,17 +6,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array, eye_array
+from scipy.sparse import coo_array, csc_array, csr_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.solvers.factorization import scaled
 
 DENSE = 300  # number of unknowns up to which null vectors come from a singular value decomposition
 
 SINGULAR = 1e-12
 """Largest singular value that counts as zero, of a matrix whose entries are scaled to about 1."""
-
-ROUNDS = 40  # largest number of scaling passes
 
 
 def free_tangent(equation: Any) -> tuple[csc_array, Index]:
@@ -58,23 +57,15 @@ def null_vectors(K: csc_array) -> tuple[Array, Array]:
         Singular values after rows and columns are scaled to size 1, the least last; and the vectors
         in columns, in the units of the unknowns.  For large matrices there is only one vector.
     """
-    n, scaled, factors = K.shape[0], K, np.ones(K.shape[0])
-    for _ in range(ROUNDS):
-        sizes = abs(scaled)
-        largest = np.array([sizes.max(axis=k).toarray().ravel() for k in (1, 0)])
-        if np.all((largest == 0) | ((largest > 0.5) & (largest < 2))):
-            break
-        row_factors, column_factors = 1 / np.sqrt(np.where(largest > 0, largest, 1.0))
-        scaled = csc_array(diags_array(row_factors) @ scaled @ diags_array(column_factors))
-        factors *= column_factors
+    n, (A, factors) = K.shape[0], scaled(csr_array(K))
     if n <= DENSE:
-        _, sizes, vectors = np.linalg.svd(scaled.toarray())
+        _, sizes, vectors = np.linalg.svd(A.toarray())
         number = max(1, int(np.count_nonzero(sizes <= SINGULAR)))
         return sizes[-number:], factors[:, None] * vectors[-number:].T
     # A shift far below the entries makes the matrix regular.
-    shifted = splu(csc_array(scaled + SINGULAR * eye_array(n)))
+    shifted = splu(csc_array(A + SINGULAR * eye_array(n)))
     y: Array = np.random.default_rng(0).normal(size=n)
     for _ in range(20):
         y = shifted.solve(shifted.solve(y / np.linalg.norm(y), trans="T"))
     y /= np.linalg.norm(y)
-    return np.array([np.linalg.norm(scaled @ y)]), (factors * y)[:, None]
+    return np.array([np.linalg.norm(A @ y)]), (factors * y)[:, None]
