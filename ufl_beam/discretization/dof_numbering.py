@@ -110,7 +110,6 @@ class DofNumbering:
             raise ModelError(f"{name}: zero length of a cell at {at_point(at)}")
         self._add_hinges(scene.hinges)
         self._number()
-        scene.free_caches()
 
     def __str__(self) -> str:
         scene = self.scene

@@ -377,11 +377,6 @@ class Scene(Record, Rich):
         equal = (joint.equal(component) for joint in self.joints for component in joint.shared)
         return [group for group in equal if group]  # none of two points away from centres
 
-    def free_caches(self) -> None:
-        """Free the memory of cached properties that only the numbering of unknowns uses."""
-        for name in ("attached", "representatives"):
-            vars(self).pop(name, None)
-
     @cached_property
     def representatives(self) -> Representatives:
         """Representatives of the degrees of freedom that joints and hinges make equal."""
