@@ -130,6 +130,34 @@ def test_collapse_of_a_column_on_a_plastic_hinge_is_a_mechanism():
     assert "Hinge(beam.start (0, 0)) gives way" in str(error)
 
 
+@pytest.mark.parametrize("in_space", [False, True])
+def test_a_support_holds_a_beam_with_a_plastic_hinge(in_space):
+    """The step fails by a load with noise: neither a mechanism nor a limit load is near."""
+
+    def vector(x, y):
+        return (x, y, 0.0) if in_space else (x, y)
+
+    tube = ub.Section.tube(d=0.1, t=0.005, E=210e9, nu=0.3, rho=7850.0)
+    hinges = {0.0: ub.ElastoPlastic(5e3)}
+    left = ub.Beam(vector(0, 0), vector(2, 0), tube, cells=4, hinges=hinges)
+    right = ub.Beam(vector(2, 0), vector(4, 0), tube, cells=4)
+    held = {"w": 0.0} if in_space else {}
+    supports = [ub.Clamped(left.start), ub.PrescribedDisplacement(right.end, u=0.0, v=0.0, **held)]
+    joint = ub.Rigid(left.end, right.start, multipliers=True)  # its forces count as pivots
+
+    def noisy(t):
+        return t + 0.1 * math.sin(1e7 * t) * (t > 1.0)
+
+    load = ub.PointLoad(left.end, force=vector(0, -8e3), amplitude=noisy)
+    scene = ub.Scene([left, right], joints=[joint], supports=supports, loads=[load])
+    before = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.05)
+    few = ub.Newton(max_iterations=1)
+    with pytest.raises(ub.ConvergenceError, match="did not converge") as caught:
+        ub.simulate(scene, ub.Static(), t=(1, 2), dt=0.05, start=before, newton=few)
+    assert "mechanism" not in str(caught.value)
+    assert not re.search(NEAR_A_LIMIT, str(caught.value))
+
+
 def test_perfectly_plastic_cells_in_a_row():
     """The seed is one of 1600 in which two of them flow in the same step."""
     strength = ub.distributions.Normal(300e6, 60e6, seed=1558)

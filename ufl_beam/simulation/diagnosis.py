@@ -13,8 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.cell_functions import strains_of
-from ufl_beam.discretization.cells_in_space import rotations_between
+from ufl_beam.discretization.cells_in_space import rotated, rotation_vectors, rotations_between
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -175,13 +174,14 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
     """Return a message if, in statics, a limit load or a bifurcation is near ``q0``; else "".
 
     The criteria are a least singular value of the tangent that is a small fraction of its value in
-    the first state, and a changed number of negative pivots.  The pivots are also counted at
-    ``probe``, a little beyond ``q0``, where yielding has reduced the stiffness.  The message names
-    connectors and cells that yield there and deform in the motion of least stiffness.
+    the first state, and a changed number of negative pivots, or sign of the determinant if a
+    tangent is not symmetric.  The pivots are also counted at ``probe``, a little beyond ``q0``,
+    where yielding has reduced the stiffness.  The message names connectors and cells that yield
+    there and deform in the motion of least stiffness.
     """
     if not len(equation.force) or not len(solution):
         return ""
-    signs, least = [], []
+    negative, least, symmetric = [], [], True
     for q in (solution.q[0][equation.subdomain.dofs], q0, probe):
         if not np.isfinite(q).all() or not equation.evaluate(q):
             return ""
@@ -189,11 +189,14 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
             return ""
         K, free, sizes, vectors = found
         try:
-            signs.append(Factorization(csr_array(K)).negative)
+            factors = Factorization(csr_array(K))
         except (np.linalg.LinAlgError, RuntimeError):
             return ""
+        negative.append(factors.negative)
+        symmetric &= factors.symmetric
         least.append(sizes[-1])
-    if len(set(signs)) == 1 and least[1] > LIMIT_STIFFNESS * least[0]:
+    alike = len({n if symmetric else n % 2 for n in negative}) == 1
+    if alike and least[1] > LIMIT_STIFFNESS * least[0]:
         return ""
     numbering = equation.subdomain.numbering
     x: Array = np.zeros(numbering.size)
@@ -278,35 +281,45 @@ def _deformations(equation: StepEquation, q: Array, x: Array, most: float = SOFT
     connectors /= np.where(
         [connector.is_rotation for connector in scene.all_connectors], 1.0, scene.size
     )
-    # Strains in the small motion, at the Gauss points, in space of inelastic cells; 1, 1, 1/m
-    strains = np.zeros((len(numbering.cells), p, numbering.width))
-    if not scene.in_space:
-        after, before = map(strains_of(equation.fields), ends)
-        strains[subdomain.cells] = ((after - before) / (2 * ε)).reshape(-1, p, 3)
-    for beams in equation.inelastic if scene.in_space else ():
-        after, before = map(beams.strains, ends)
-        strains[beams.sections()[0], 0] = (after - before) / (2 * ε)
-    # Works of the tangent, and of the elastic stiffness, there
-    works = np.zeros((2, len(numbering.cells), p))
+    # Works of the tangent, and of the elastic stiffness, on the strains at the Gauss points
+    now, elastic = works = np.zeros((2, len(numbering.cells), p))
     for beams in equation.inelastic:
-        cells = beams.sections()[0]
-        by_point = strains[cells].reshape(-1, numbering.width)
-        works[:, cells] += beams.points.works(by_point).reshape(2, -1, p)
-    lengths = np.repeat([scene.size, 1.0], [d := numbering.displacements, numbering.width - d])
-    sizes = np.abs(strains / lengths).max(axis=(1, 2), initial=0.0)
-    sizes *= numbering.lengths(np.arange(len(numbering.cells)))
-    now, elastic = works
+        after, before = map(beams.strains, ends)
+        by_point = beams.points.works((after - before) / (2 * ε))
+        works[:, beams.sections()[0]] += by_point.reshape(2, -1, p)
+    turns = equation.turns() if scene.in_space else None
+    sizes = _deformations_of_cells(numbering, subdomain.gather(q), x, turns)
     left_in_cells = np.divide(now, elastic, out=np.ones_like(now), where=elastic > 0).min(axis=1)
     if subdomain.comm.size > 1:
-        for values, of in ((connectors, MPI.SUM), (sizes, MPI.SUM), (left, MPI.MIN)):
+        for values, of in ((connectors, MPI.SUM), (left, MPI.MIN), (left_in_cells, MPI.MIN)):
             subdomain.comm.Allreduce(MPI.IN_PLACE, values, op=of)
-        subdomain.comm.Allreduce(MPI.IN_PLACE, left_in_cells, op=MPI.MIN)
     deformations = []
     for deformed, remaining in ((connectors, left), (sizes, left_in_cells)):
         soft = remaining <= most
         stiff = bool((deformed[~soft] >= LEAST_NAMED).any())
         deformations.append(Deformed(_named(np.where(soft, deformed, 0.0)), stiff))
     return deformations
+
+
+def _deformations_of_cells(
+    numbering: DofNumbering, q: Array, x: Array, turns: Array | None
+) -> Array:
+    """Return the largest deformation in each cell by a small motion ``x`` from ``q``; (num_cells,).
+
+    Between neighbouring nodes it is a displacement, in sizes of the scene, or a rotation, in rad,
+    beyond the rigid motion.  In space, ``turns`` are the quaternions of the nodes.
+    """
+    d, (a, b) = numbering.displacements, numbering.pieces.T
+    u, ψ = np.split(x[numbering.dofs], [d], axis=1)
+    arms = np.diff((numbering.points + q[numbering.dofs[:, :d]])[numbering.pieces], axis=1)[:, 0]
+    if turns is None:
+        carried = (ψ[a] + ψ[b]) / 2 * np.column_stack([-arms[:, 1], arms[:, 0]])
+    else:
+        ψ = rotated(ψ, rotation_vectors(turns[: len(ψ)]))
+        carried = np.cross((ψ[a] + ψ[b]) / 2, arms)
+    apart = np.abs(u[b] - u[a] - carried).max(axis=1) / numbering.scene.size
+    pieces = np.maximum(apart, np.abs(ψ[b] - ψ[a]).max(axis=1))
+    return np.asarray(pieces.reshape(-1, numbering.mesh.degree).max(axis=1))
 
 
 def _describe(

@@ -283,22 +283,27 @@ class StepEquation:
                 self._pass_on_step(archive, q)
         return unknown
 
-    def _take_turns(self, t: float, q: Array) -> None:
-        """Let loads and supports of another scene begin with the rotations of the nodes."""
+    def turns(self) -> Array:
+        """Return the quaternions of nodes and bodies in space, see :data:`TURNS`; (nodes, 4)."""
         numbering = self.subdomain.numbering
-        turns: Array = np.zeros((1, len(numbering.points) + len(numbering.scene.rigid_bodies), 4))
+        turns = np.zeros((len(numbering.points) + len(numbering.scene.rigid_bodies), 4))
         hinges = (x for x in self.connector_terms if hasattr(x, "turns"))  # nodes of no cell
         for term in (*self.nodes_in_space, *hinges):
             places, nodes = term.turns(numbering)
-            turns[0, nodes] = term.states.ravel()[places]
+            turns[nodes] = term.states.ravel()[places]
         if not self.subdomain.alone:  # each node is on one process
             self.subdomain.comm.Allreduce(MPI.IN_PLACE, turns)
+        return turns
+
+    def _take_turns(self, t: float, q: Array) -> None:
+        """Let loads and supports of another scene begin with the rotations of the nodes."""
+        numbering, turns = self.subdomain.numbering, self.turns()
 
         def rotation_vector(support: Support) -> Array:
-            return np.asarray(turns_at(numbering, support.place, turns).as_rotvec()[0])
+            return np.asarray(turns_at(numbering, support.place, turns[None]).as_rotvec()[0])
 
         self.supports.find_angles(rotation_vector, t)
-        self._put_turns(by_rotation(numbering, turns[0]))
+        self._put_turns(by_rotation(numbering, turns))
         for load in self.loads:
             if isinstance(load, Block) and load.remembers:
                 load.carry_on(t, q, None, None)
