@@ -115,14 +115,10 @@ class Record:
             if value is not default:
                 try:
                     checked = check(value, what=word)
-                except ArgumentError:  # again with the name of the record, which takes time
+                except ArgumentError as error:  # its message begins with the word
                     owner = type(self).__name__ if name in NAMING else self._label()
-                    try:
-                        checked = check(value, what=f"{owner}: {word}")
-                    except ArgumentError as error:
-                        if isinstance(error, self._refused):
-                            raise
-                        raise self._refused(str(error)) from None
+                    kind = type(error) if isinstance(error, self._refused) else self._refused
+                    raise kind(f"{owner}: {error}") from error.__cause__
                 object.__setattr__(self, name, value if checked is None else checked)
 
     def _label(self) -> str:
