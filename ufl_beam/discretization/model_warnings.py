@@ -43,17 +43,15 @@ def warn_of_masses(scene: Scene) -> None:
     if not light:
         return
     names = ", ".join(dict.fromkeys(light[:20]))
-    if any(beam.section.rhoA for beam in scene.beams):
-        warn(
-            f"{names}: without mass, because neither rho nor rhoA of the section is given, but "
-            "other beams of the scene have mass. Give rho or rhoA; rhoA=0.0 if they have none"
-        )
-    elif not any(body.mass for body in scene.bodies) and not any(m.mass for m in scene.masses):
-        warn(
-            f"{names}: without mass, because neither rho nor rhoA of the section is given, and "
-            "nothing else in the scene has mass, so that dynamics has no inertia. Give rho or "
+    others = "but other beams of the scene have mass. Give rho or rhoA; rhoA=0.0 if they have none"
+    if not any(beam.section.rhoA for beam in scene.beams):
+        if any(body.mass for body in scene.bodies) or any(m.mass for m in scene.masses):
+            return
+        others = (
+            "and nothing else in the scene has mass, so that dynamics has no inertia. Give rho or "
             "rhoA, or use Static()"
         )
+    warn(f"{names}: without mass, because neither rho nor rhoA of the section is given, {others}")
 
 
 def warn_of_warping(scene: Scene) -> None:
@@ -171,11 +169,11 @@ def warn_of_free_hinges(scene: Scene) -> None:
 
 def warn_of_touching(numbering: DofNumbering) -> None:
     """Warn of ends of beams that touch another beam without a connection."""
-    if not numbering.scene.beams or not len(touching := _touching(numbering)):
+    if not numbering.scene.beams or not (touching := _touching(numbering)):
         return
-    end, touched = (numbering.place(int(vertex)) for vertex in touching[0, :2])
-    more = f"; so do {len(touching) - 1} more pairs of places" if len(touching) > 1 else ""
-    gap = float(touching[0, 2])
+    (*vertices, gap), *others = touching
+    end, touched = map(numbering.place, vertices)
+    more = f"; so do {len(others)} more pairs of places" if others else ""
     beside = math.dist(end.point, touched.point) > 2 * gap + TOUCHING * numbering.scene.size
     at = f"{touched.beam.name} beside {touched}" if beside else touched
     warn(
@@ -185,29 +183,28 @@ def warn_of_touching(numbering: DofNumbering) -> None:
     )
 
 
-def _touching(numbering: DofNumbering) -> Array:
-    """Return ends, the nearest vertices of beams that they touch, and the gaps (m); (n, 3).
+def _touching(numbering: DofNumbering) -> list[tuple[int, int, float]]:
+    """Return pairs of an end and the nearest vertex of a beam that it touches, and the gaps; m.
 
     Ends that are connected with a vertex of the beam that they touch are left out.
     """
     first = numbering.first_vertices
     end, touched, gap = _contacts(numbering.points[: first[-1]], first)
     if not len(end):
-        return np.empty((0, 3))
+        return []
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     group = _groups(numbering)[: first[-1]]
     joined = group[end] == group[touched]
     keys = end * len(first) + beams[touched]
-    loose = ~joined & ~np.isin(keys, keys[joined])
-    if not loose.any():
-        return np.empty((0, 3))
-    end, touched, gap, keys = end[loose], touched[loose], gap[loose], keys[loose]
-    order = np.lexsort((gap, keys))
-    _, nearest = np.unique(keys[order], return_index=True)
-    rows = np.column_stack([end, touched, gap])[order][nearest]
+    loose = np.flatnonzero(~joined & ~np.isin(keys, keys[joined]))
+    order = loose[np.lexsort((gap[loose], keys[loose]))]
+    nearest = order[np.unique(keys[order], return_index=True)[1]]
+    rows = zip(*(x[nearest].tolist() for x in (end, touched, gap)), strict=True)
     # Two ends that touch each other count as one pair.
-    _, once = np.unique(np.sort(rows[:, :2], axis=1), axis=0, return_index=True)
-    return np.asarray(rows[np.sort(once)])
+    pairs = dict[frozenset[int], tuple[int, int, float]]()
+    for row in rows:
+        pairs.setdefault(frozenset(row[:2]), row)
+    return [*pairs.values()]
 
 
 @cached_by_structure

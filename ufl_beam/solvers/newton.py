@@ -342,7 +342,7 @@ class Solver:
         reason, residuals = self.c.reason, self._residuals()
         worst = self._subdomain.numbering.worst(self._subdomain.gather(residuals))
         places = [f"{size:.1e} N in {place}" for place, size in [*worst.items()][:3]]
-        size = lib.over_processes(self.c, lib.HYPOT, float(np.linalg.norm(residuals)))
+        size = self.size(self._r)
         sizes = (
             f"; residual {size:.3e} N, largest: {', '.join(places) or 'nowhere'}; "
             f"forces in the scene {self.scale():.3e} N"
