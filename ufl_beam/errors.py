@@ -314,6 +314,16 @@ def require_sequence(value: Any, what: str) -> tuple[Any, ...]:
     raise ArgumentTypeError(f"{what} = {shorten(value)} must be a list")
 
 
+def require_numbers(value: Any, what: str) -> tuple[Any, ...]:
+    """Return ``value`` as a tuple of finite numbers, or raise :class:`ArgumentError`."""
+    numbers = require_sequence(value, what)
+    if {*map(type, numbers)} <= {float} and np.isfinite(numbers).all():
+        return numbers  # a record of an earthquake has many
+    for i, number in enumerate(numbers):
+        require_number(number, f"{what}[{i}]")
+    return numbers
+
+
 def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
     """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is an instance of ``kind``."""
     if not isinstance(value, kind):

@@ -150,8 +150,7 @@ class Spline(GuideCurve):
         )
         steps = (math.dist(p, q) for p, q in pairwise(points))
         given = [*accumulate(steps, initial=0.0)] if self.s is None else self.s
-        for i, number in enumerate(s := checks.require_sequence(given, "Spline: s")):
-            checks.require_number(number, f"Spline: s[{i}]")
+        s = checks.require_numbers(given, "Spline: s")
         if len(points) < 2 or len(s) != len(points):
             raise ModelError(
                 f"Spline: {len(points)} points, {len(s)} parameters s; give at least two points, "
@@ -339,12 +338,8 @@ class Table:
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):
-            checked = checks.require_sequence(getattr(self, name), f"Table: {name}")
+            checked = checks.require_numbers(getattr(self, name), f"Table: {name}")
             object.__setattr__(self, name, checked)
-            if {*map(type, checked)} <= {float} and np.isfinite(checked).all():
-                continue  # a record has many numbers
-            for i, number in enumerate(checked):
-                checks.require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise ModelError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "

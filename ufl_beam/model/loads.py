@@ -14,12 +14,10 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
-    ArgumentError,
     ArgumentTypeError,
     ModelError,
     closed,
     require_all,
-    require_returned,
     require_vector,
     shorten,
 )
@@ -171,13 +169,12 @@ def profile_at(s: Array, profile: Profile, span: tuple[float, float], what: str)
     values = np.zeros(s.shape)
     for index, at in np.ndenumerate(s):
         if first <= at <= last:
-            name, where = what.rsplit(maxsplit=1)[-1], f"s = {at:.9g}"
+            where = f"s = {at:.9g}"
             try:
-                values[index] = require_returned(profile(float(at)), name, where, finite=True)
-            except ArgumentError as error:
-                raise ModelError(f"{what.removesuffix(name)}{error}") from None
+                value = profile(float(at))
             except Exception as error:
                 raise ModelError(f"{what} fails at {where}: {shorten(error)}") from error
+            values[index] = checks.require_returned(value, what, where, finite=True)
     return values
 
 

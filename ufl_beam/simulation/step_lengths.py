@@ -8,21 +8,17 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.cells_in_space import rotations_between
 from ufl_beam.discretization.state_io import Archive, State
-from ufl_beam.errors import (
-    ArgumentError,
-    ConvergenceError,
-    StepFailed,
-    require_number,
-    require_sequence,
-)
+from ufl_beam.errors import ArgumentError, ConvergenceError, StepFailed, require_numbers
 from ufl_beam.mechanics.time_scheme import nodal_step, order_of, stages_of
 from ufl_beam.model.loads import MovingLoad
+from ufl_beam.model.records import Positive, PositiveOrNone, Record
 from ufl_beam.output.output_files import add_prefix, remove_prefix
 from ufl_beam.quadrature import gauss_rule
 from ufl_beam.simulation.simulation import Simulation
@@ -104,7 +100,7 @@ class EqualSteps(Steps):
 
 
 @dataclass(frozen=True)
-class Adaptive:
+class Adaptive(Record):
     """Adaptive time steps with a limited error of each step, for the argument ``dt``.
 
     The error of a step is estimated from its acceleration, from the change of the acceleration
@@ -143,20 +139,13 @@ class Adaptive:
         (True, True)
     """
 
-    tolerance: float
-    first: float | None = None
-    longest: float | None = None
-    shortest: float | None = None
-    stops: Sequence[float] = ()
+    _refused = ArgumentError
 
-    def __post_init__(self) -> None:
-        require_number(self.tolerance, "Adaptive: tolerance", positive=True)
-        for name in ("first", "longest", "shortest"):
-            if getattr(self, name) is not None:
-                require_number(getattr(self, name), f"Adaptive: {name}", positive=True)
-        object.__setattr__(self, "stops", require_sequence(self.stops, "Adaptive: stops"))
-        for i, stop in enumerate(self.stops):
-            require_number(stop, f"Adaptive: stops[{i}]")
+    tolerance: Positive
+    first: PositiveOrNone = None
+    longest: PositiveOrNone = None
+    shortest: PositiveOrNone = None
+    stops: Annotated[Sequence[float], require_numbers] = ()
 
 
 class AdaptiveSteps(Steps):
