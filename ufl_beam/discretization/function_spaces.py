@@ -40,8 +40,7 @@ class Element:
 
     Attributes:
         degree: Polynomial degree of configurations.
-        axis: Undeformed axis at the points of ``dx(1)``.
-        anywhere: Undeformed axis at the points of any quadrature rule.
+        axis: Undeformed axis.
         space: Configurations (u_x, u_y, ψ).
         q0, q1: Configurations at the beginning and at the end of a step.
         w: Test function, the virtual motion.
@@ -56,8 +55,7 @@ class Element:
         if not in_space:  # forms in space are no forms of UFL
             along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
             along.x.array[along.function_space.dofmap.list] = 0.0, 1.0
-            self.anywhere = Axis(self._cell, mesh.nodes, along)
-            self.axis = self.anywhere if mesh.degree > 1 else Axis(self._cell, mesh.nodes, 0.5)
+            self.axis = Axis(self._cell, mesh.nodes, along)
         mixed = basix.ufl.mixed_element([line] * (6 if in_space else 3))
         self.space = fem.functionspace(self._cell, mixed)
         self.q0, self.q1 = self.configuration(), self.configuration()
