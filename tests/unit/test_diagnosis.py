@@ -173,6 +173,28 @@ def test_perfectly_plastic_cells_in_a_row():
 # -- limit loads -----------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("in_space", [False, True])
+def test_no_limit_load_is_near_a_cantilever_that_is_rolled_up(in_space):
+    """Its moment has turned the tip by 2 rad, when Newton's method may no longer iterate."""
+
+    def vector(x, y):
+        return (x, y, 0.0) if in_space else (x, y)
+
+    rod = ub.Section.circle(d=0.02, E=210e9, nu=0.3, rho=7850.0)
+    beam = ub.Beam(vector(0, 0), vector(1, 0), rod, cells=10)
+    moment = (0.0, 0.0, 2 * rod.EI) if in_space else 2 * rod.EI
+    load = ub.PointLoad(beam.end, force=vector(1.0, 0.0), moment=moment, amplitude=growing)
+    simulation = ub.Simulation(clamped(beam, loads=[load]), ub.Static())
+    simulation.keep()
+    for k in range(20):
+        simulation.step_to((k + 1) / 20)
+    simulation.solver.c.most = 1
+    with pytest.raises(ub.ConvergenceError, match="did not converge") as caught:
+        simulation.step_to(1.5)
+    assert not re.search(NEAR_A_LIMIT, str(caught.value))
+    simulation.close()
+
+
 def test_collapse_by_its_weight_is_a_limit_load():
     """P-Delta: the spring at the foot of a column hardens by 20 N m, the weight takes 50 N m."""
     # It yields at 5 N m = H l + P v: before, v = 5/100 (and 1.7 % of bending), so H = 2.5 N of 8.

@@ -68,6 +68,10 @@ limit load is near.
 The ratio falls with the square root of the distance to the limit load.  A distance of 1/4096 of a
 step, the smallest substep, gives 1/64; a tenth allows for larger distances."""
 
+MOST_TURNED = 0.2
+"""Largest change of a quaternion of a node, half of the angle in rad, with which the tangent of the
+first state in space is known: unknowns of rotations refer to the present axes of the node."""
+
 LEDGER_TOLERANCE = 10.0
 """Largest relative imbalance of a ledger that should be exact, as a multiple of ``Newton.rtol``."""
 
@@ -174,15 +178,19 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
     """Return a message if, in statics, a limit load or a bifurcation is near ``q0``; else "".
 
     The criteria are a least singular value of the tangent that is a small fraction of its value in
-    the first state, and a changed number of negative pivots, or sign of the determinant if a
-    tangent is not symmetric.  The pivots are also counted at ``probe``, a little beyond ``q0``,
-    where yielding has reduced the stiffness.  The message names connectors and cells that yield
-    there and deform in the motion of least stiffness.
+    the first state, unless nodes in space have turned far since, and a changed number of negative
+    pivots, or sign of the determinant if a tangent is not symmetric.  The pivots are also counted
+    at ``probe``, a little beyond ``q0``, where yielding has reduced the stiffness.  The message
+    names connectors and cells that yield there and deform in the motion of least stiffness.
     """
     if not len(equation.force) or not len(solution):
         return ""
     negative, least, symmetric = [], [], True
-    for q in (solution.q[0][equation.subdomain.dofs], q0, probe):
+    states, numbering = [solution.q[0][equation.subdomain.dofs], q0, probe], solution.numbering
+    ends = [solution.turns(n) for n in (0, -1) if numbering.scene.in_space]
+    if np.abs(np.diff(ends, axis=0)).max(initial=0.0) > MOST_TURNED:
+        del states[0]
+    for q in states:
         if not np.isfinite(q).all() or not equation.evaluate(q):
             return ""
         if (found := soft_motions(equation)) is None:
@@ -196,9 +204,8 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
         symmetric &= factors.symmetric
         least.append(sizes[-1])
     alike = len({n if symmetric else n % 2 for n in negative}) == 1
-    if alike and least[1] > LIMIT_STIFFNESS * least[0]:
+    if alike and least[-2] > LIMIT_STIFFNESS * least[0]:
         return ""
-    numbering = equation.subdomain.numbering
     x: Array = np.zeros(numbering.size)
     x[free] = vectors[:, -1]
     x /= np.abs(x * numbering.scales).max() or 1.0
