@@ -18,7 +18,7 @@ from ufl_beam.dolfinx_compat import compile_form, fem
 from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.reference.step_problem import StepProblem
-from ufl_beam.simulation.reference_run import ReferenceRun
+from ufl_beam.simulation.reference_run import ReferenceInPlane
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*opened in 1 cell, in the middle of a cell")
 
@@ -111,8 +111,9 @@ def test_a_run_in_two_parts_by_different_solvers(tmp_path):
     scene, scheme = machine(), ub.EnergyMomentum()
     folder, tip = MPI.COMM_WORLD.bcast(tmp_path), scene.beams[3].end
     record = [ub.History(folder / "tip.csv", places=[tip]), ub.XDMF(folder / "machine.xdmf")]
-    whole = run(scene, scheme, 0.12, 4e-3, record=record)
-    other = run(scene, scheme, 0.12, 4e-3, reference=False)
+    extremes = [ub.Extremes(), ub.Extremes()]
+    whole = run(scene, scheme, 0.12, 4e-3, record=[*record, extremes[0]])
+    other = run(scene, scheme, 0.12, 4e-3, reference=False, record=extremes[1])
     assert apart(whole, other) < SAME
     assert whole.substeps == other.substeps
     assert np.abs(whole.v - other.v).max() < 10 * SAME * np.abs(other.v).max()
@@ -120,6 +121,9 @@ def test_a_run_in_two_parts_by_different_solvers(tmp_path):
     for name, energy in other.energy.items():
         difference = np.abs(whole.energy[name] - energy).max()
         assert difference < SAME * other.energy.energy_transferred, name
+    for beam in scene.beams:
+        one, two = (x.section_forces(beam) for x in extremes)
+        assert np.abs(np.array(one[:2]) - two[:2]).max() < 10 * SAME * np.abs(two[:2]).max()
     for first in (False, True):
         begun = run(scene, scheme, 0.08, 4e-3, reference=first)
         rest = run(scene, scheme, 0.12, 4e-3, begin=0.08, start=begun)
@@ -172,7 +176,7 @@ def test_a_new_link_stops_a_beam():
 
 def state_of(scene, scheme):
     options = {"t0": 0.0, "start": None, "newton": ub.Newton(reference=True), "mesh": None}
-    return ReferenceRun(scene, scheme, comm=MPI.COMM_WORLD, **options)
+    return ReferenceInPlane(scene, scheme, comm=MPI.COMM_WORLD, **options)
 
 
 def assembled(form):
@@ -187,7 +191,7 @@ def test_the_residual_is_the_derivative_of_the_functionals():
     strains is zero, as r are the resultants.
     """
     state = state_of(weak_cell(0.0, 4 * np.pi), ub.Static())
-    fields, jump = state.fields, 0.0
+    fields, jump = state.problem.fields, 0.0
     while jump < 0.1:
         state.step_to(state.t + 1 / 500)
         mine = np.abs(fields.jump1.x.array).max(initial=0.0)
@@ -277,7 +281,8 @@ def test_errors_are_no_failed_steps(monkeypatch):
 
 def test_all_objects_of_petsc_are_destroyed():
     state = state_of(machine(), ub.EnergyMomentum())
-    objects = [x for x in vars(state).values() if isinstance(x, PETSc.Object)] + state.matrices
+    problem = state.problem
+    objects = [x for x in vars(problem).values() if isinstance(x, PETSc.Object)] + problem.matrices
     state.close()
     assert len(objects) > 5
     assert not any(x.handle for x in objects)

@@ -45,13 +45,29 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inertia_and_damping import Inertia
 
 
-class PresentState(ABC):
-    """Present state of a run, for users' laws; all processes call its methods together."""
+class StateView(ABC):
+    """Present state of a run, for recorders, controllers and laws of users.
+
+    All processes call its methods together.
+    """
 
     scene: Scene
     numbering: DofNumbering
     scheme: Scheme
     t: float  # s
+    comm: MPI.Intracomm  # all processes of the run
+    subdomain: Subdomain  # degrees of freedom of this process
+    fields: Fields
+    parameter: Parameter  # names and formats of `t`: time, or the load factor of a path
+    substeps: int  # number of steps so far; substeps count as steps
+    cell_forces: CellForces
+    solution: Any  # `Solution` of the run
+    inertia: Inertia
+    beams: list[BeamCells]
+    inelastic: list[InelasticCells]
+    solver: Solver  # Newton's method
+    newton: Newton  # its options
+    controllers: Any  # `Controllers` of the simulation
 
     @property
     @abstractmethod
@@ -124,24 +140,6 @@ class PresentState(ABC):
         They are computed as in :meth:`Solution.section_forces`.
         """
         return self.now.forces_in_middle(0)
-
-
-class StateView(PresentState):
-    """Present state of a run, for recorders and controllers."""
-
-    comm: MPI.Intracomm  # all processes of the run
-    subdomain: Subdomain  # degrees of freedom of this process
-    fields: Fields
-    parameter: Parameter  # names and formats of `t`: time, or the load factor of a path
-    substeps: int  # number of steps so far; substeps count as steps
-    cell_forces: CellForces
-    solution: Any  # `Solution` of the run
-    inertia: Inertia
-    beams: list[BeamCells]
-    inelastic: list[InelasticCells]
-    solver: Solver  # Newton's method
-    newton: Newton  # its options
-    controllers: Any  # `Controllers` of the simulation
 
     @property
     @abstractmethod

@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 from scipy.sparse import csr_array
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.dolfinx_compat import compile_form, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -97,6 +97,16 @@ class Connectors:
         forms.geometry.x.array[_cell_dofs(forms.geometry.function_space)] = geometry
         self._row_dofs, self._rows = _cell_dofs(forms.row.function_space), np.zeros((n, 3))
 
+    def start(self, q: Array, internal: State) -> None:
+        """Begin with a configuration and the internal variables of a :class:`Simulation`."""
+        self.accept(q)
+        names = (name for name in internal if name.startswith("Hinged, "))
+        for table in (internal[name] for name in names):
+            for k, hinge in self.hinges.items():
+                for row in table[table[:, 0] == self.indices[k], 1:]:
+                    hinge.opening, hinge.e0, _, _, flows = map(float, row)
+                    hinge.flows = int(flows)
+
     def accept(self, q: Array) -> None:
         """Accept a configuration, with which the next step begins."""
         self.e0 = self.motions(q)
@@ -136,12 +146,11 @@ class Hinge:
         flows: Direction of the growth in the last step, or 0.
         way: Direction in which the jump grows in this step, or 0 if the hinge is held.
         excess: Relative excess of the moment over the limit of a held hinge.
-        dissipated: Energy; J.
     """
 
     def __init__(self, hinge: Connector, scheme: Scheme) -> None:
         self.law: Any = law_of(hinge)
-        self.scheme, self.opening, self.flows, self.dissipated, self.e0 = scheme, 0.0, 0, 0.0, 0.0
+        self.scheme, self.opening, self.flows, self.e0 = scheme, 0.0, 0, 0.0
         self.begin(0.0, hold=True)
 
     @property
@@ -189,10 +198,9 @@ class Hinge:
 
     def accept(self) -> None:
         """Accept the jump at the end of a step."""
-        a = np.array([abs(self.way * self.grown)])
-        self.dissipated += float((a * self.law.mean_traction(np.array([self.opening]), a))[0])
-        self.opening, self.e0 = self.opening + float(a[0]), self.e0 + self.grown
-        self.flows = self.way * int(a[0] > 0)
+        growth = abs(self.way * self.grown)
+        self.opening, self.e0 = self.opening + growth, self.e0 + self.grown
+        self.flows = self.way * int(growth > 0)
 
 
 def connectors_of(numbering: DofNumbering, scheme: Scheme) -> list[Connectors]:

@@ -37,8 +37,7 @@ class Fields:
         # Plastic strains e - C⁻¹ r of the return map, so that r is the derivative of W for every
         # law, and derivatives of r = (N, V, M) by the strains at the end; quadrature elements
         self.plastic, self.moduli = self.at_points((3,)), self.at_points((3, 3))
-        # Stiffness C = (EA, GA, EI), and the same without cells that have material points; DG0
-        self.stiffness, self.elastic = self.cellwise((3,)), self.cellwise((3,))
+        self.stiffness = self.cellwise((3,))  # C = (EA, GA, EI); DG0
         self.inertia = self.cellwise((2,))  # (A_ρ, J_ρ)
         self.h = numbering.lengths(frame.cells)
         sections = [numbering.scene.beams[i].section for i in numbering.beam_of_cell[frame.cells]]
@@ -46,8 +45,6 @@ class Fields:
         self.stiffness.x.array[:] = C.ravel()
         self.inertia.x.array[:] = np.ravel([(s.rhoA, s.rhoI) for s in sections])
         self.moduli.x.array.reshape(-1, 9)[:, ::4] = scheme.theta * C
-        inelastic = np.isin(frame.cells, numbering.inelastic_cells)
-        self.elastic.x.array[:] = np.where(inelastic[:, None], 0.0, C).ravel()
         self._make_forms(scheme)
 
     def _make_forms(self, scheme: Scheme) -> None:
@@ -60,9 +57,6 @@ class Fields:
 
         def W(e: Expr) -> Expr:
             return functional.elastic_energy(e - self.plastic, self.stiffness)  # equation (35)
-
-        def W_elastic(e: Expr) -> Expr:
-            return functional.elastic_energy(e, self.elastic)
 
         e0 = enhanced_strain(self.q0, self.jump0, axis)
         e1 = enhanced_strain(self.q1, self.jump1, axis)
@@ -92,14 +86,6 @@ class Fields:
         self.tangent = compile_form((virtual_work(dr, variation(w)) + geometric) * dx)
         self.mass = compile_form(mass(w, dq))
         self.stiffness_at_rest = compile_form(stiffness_at_rest(w, dq))
-        # Energy of elastic cells at the end, equation (49); their numerical loss / (2 alpha)
-        energy = functional.potential(W_elastic, self.q1, self.jump1, ufl.as_ufl(0.0), axis) * dx
-        self.elastic_energy, self.lost = map(compile_form, (energy, W_elastic(e1 - e0) * dx))
-        # Test functions that are not continuous give the forces of the nodes on each cell.
-        self.apart = fem.functionspace(self.mesh, ("DG", 1, (3,)))
-        w = ufl.TestFunction(self.apart)
-        on_cells = force(w), mass(w, self.v), stiffness_at_rest(w, self.v)
-        self.force_on_cells, self.mass_on_cells, self.damping_on_cells = map(compile_form, on_cells)
         self.strains, self.resultants = map(self._evaluation, (strain(self.q1, axis), r))
 
     def dx(self, degree: int) -> ufl.Measure:
@@ -115,8 +101,8 @@ class Fields:
         element = basix.ufl.quadrature_element("interval", value_shape=tuple(shape), degree=degree)
         return fem.Function(fem.functionspace(self.mesh, element))
 
-    def load_on_cells(self, load: Load) -> Array:
-        """Return the forces of a load along beams for a factor of one; see forces_on_cells."""
+    def work_of(self, load: Load) -> fem.Form:
+        """Return the virtual work of a load along beams for a factor of one."""
         density = self.at_points((3,), degree=9)
         values, numbering = density.x.array.reshape(len(self.cells), -1, 3), self.numbering
         if isinstance(load, LineLoad):
@@ -127,13 +113,8 @@ class Fields:
             values[on] = factors.reshape(len(i), points.size, 1) * (*load.force, load.moment)
         elif isinstance(load, Gravity):
             values[:, :, :2] = self.inertia.x.array[::2, None, None] * load.acceleration
-        work = ufl.dot(density, ufl.TestFunction(self.apart)) * self.dx(9)
-        return self.forces_on_cells(compile_form(work))
-
-    def forces_on_cells(self, form: fem.Form) -> Array:
-        """Return the forces of both nodes on each cell; (cells, 2, 3)."""
-        assembled = fem.assemble_vector(form).array.reshape(-1, 3)
-        return np.asarray(assembled[self.apart.dofmap.list])
+        w = ufl.TestFunction(self.q1.function_space)
+        return compile_form(ufl.dot(density, w) * self.dx(9))
 
     def _evaluation(self, value: Expr) -> Callable[[], Array]:
         """Return a function that evaluates an expression in the middle of cells; (cells, 3)."""

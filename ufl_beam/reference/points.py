@@ -43,18 +43,13 @@ class Points:
     Attributes:
         variables: Internal variables: functions of the quadrature element with n components.
         excess: Relative excess over the limit of points that stay closed; (cells, n).
-        recorded: (N, V, M) at the end of the last step, jump, energies dissipated by plastic
-            strains and by jumps; (cells, 6).
-        stored: Elastic and hardening energy of each cell; (cells, 2); J.
-        numerical: Numerical loss since the beginning; J.
     """
 
     def __init__(
         self, section: SectionPoints, cells: Index, numbering: DofNumbering, fields: Fields,
         scheme: Scheme,
     ) -> None:  # fmt: skip
-        self.section, self.cells, self.fields = section, cells, fields
-        self.scheme, self.θ = scheme, scheme.theta
+        self.section, self.cells, self.fields, self.θ = section, cells, fields, scheme.theta
         self.equations = PointEquations(section.kind, section.softening, scheme)
         n, law, softening = len(section.weights), section.kind.law, section.softening
         self.B = np.reshape(
@@ -80,8 +75,6 @@ class Points:
         start |= {"jump": 0.0, "opening": 0.0, "traction": limit, "flows": 0.0}
         self.variables = {name: fields.at_points((n,)) for name in start}
         self._set(start)
-        self.recorded: Array = np.zeros((len(cells), 6))
-        self.numerical = 0.0
 
     def _set(self, values: Mapping[str, Any]) -> None:
         for name, x in values.items():
@@ -175,66 +168,20 @@ class Points:
     # -- accepted states -------------------------------------------------------------------------
 
     @np.errstate(all="ignore")
-    def change(self) -> float:
-        """Return the energy stored and dissipated in the step; J."""
-        end = self.equations.end(self.at)
-        points = end.worked + end.broken + end.elastic + end.hardening + end.released + end.relaxed
-        energies = self._sum(self.length * points) + self._rest(self.e1)
-        return float(energies.sum() - self.stored.sum())
-
-    @np.errstate(all="ignore")
     def accept(self) -> None:
         """Accept the internal variables of the latest return map."""
-        at, end, α, length = self.at, self.equations.end(self.at), self.scheme.alpha, self.length
-        self.recorded[:, 4] += self._sum(length * end.worked)
-        self.recorded[:, 5] += self._sum(length * end.broken)
-        lost = self._sum(length * (2 * α * end.lost + end.released))
-        lost += 2 * α * self._rest(self.e1 - self.e0)
-        self.numerical += float(lost.sum())
+        end = self.equations.end(self.at)
         new = {"traction": end.traction, "jump": end.jump, "opening": end.opening}
-        new |= dict(zip(self.names, end.variables, strict=True)) | {"flows": at["growth"] > 0}
-        self._set(new)
-        self._store(self.e1)
-
-    def _store(self, strains: Array) -> None:
-        """Compute forces and energies of the accepted state at strains of these cells."""
-        self.e0, at, section = strains, self._old(), self.section
-        law, z = self.equations.law(at), self.equations.state(at)
-        e = law.as_argument((strains @ self.B.T + strain_by_jump(at["jump"], self.length),))
-        stress = law.as_tuple(law.stress(e, z))[0] * (at["traction"] != 0)
-        self.recorded[:, :3] = section.rest * strains + (section.weights * stress) @ self.B
-        self.recorded[:, 3] = section.hinges * at["jump"][:, -1]
-        elastic = self._sum(self.length * law.elastic_energy(e, z)) + self._rest(strains)
-        hardening = self._sum(self.length * law.hardening_energy(z))
-        self.stored = np.column_stack([elastic, hardening])
-
-    def _sum(self, values: Any) -> Array:
-        """Return the sum over the points of each cell, with their weights."""
-        return np.asarray(np.broadcast_to(values, self.shape) @ self.section.weights)
-
-    def _rest(self, strains: Array) -> Array:
-        """Return the energy of resultants without points in each cell; J."""
-        return np.asarray(strains**2 @ self.section.rest / 2 * self.fields.h[self.cells])
-
-    # -- beginning and restart -------------------------------------------------------------------
+        new |= dict(zip(self.names, end.variables, strict=True))
+        self._set(new | {"flows": self.at["growth"] > 0})
+        self.e0 = self.e1
 
     def start(self, strains: Array, internal: State) -> None:
-        """Begin at strains of all cells, with a table of :meth:`state` if there is one."""
-        self._store(strains[self.cells])
-        table = internal.get(f"cells, {self.state().shape[1] - 1}")
-        if table is not None and len(self.cells):
+        """Begin at strains of all cells, with the internal variables of a :class:`Simulation`."""
+        self.e0, first = strains[self.cells], self.rows[:1]
+        tables = (table for name, table in internal.items() if name.startswith("cells, "))
+        for table in (x for x in tables if np.isin(first, x[:, 0]).any()):
             values = table[np.searchsorted(table[:, 0], self.rows), 1:]
-            blocks = np.split(values[:, :-11], len(self.columns), axis=1)
-            named = zip(self.columns, blocks, strict=True)
-            self._set({name: x for name, x in named if name in self.variables})
-            self.recorded = values[:, -11:-5].copy()
-            self._store(values[:, -5:-2].copy())
-        jumps = self.section.hinges * self.recorded[:, 3:4]
-        for function in (self.fields.jump0, self.fields.jump1):
-            by_cell(function)[self.cells] = jumps
-
-    def state(self) -> Array:
-        """Return the variables as a table with a row for each cell; see ``solution.internal``."""
-        at = {**self._old(), "strain": self.e0 @ self.B.T}
-        blocks = [at[name] for name in self.columns]
-        return np.column_stack([self.rows, *blocks, self.recorded, self.e0, self.stored])
+            n = self.shape[1]
+            columns = {name: values[:, k * n : k * n + n] for k, name in enumerate(self.columns)}
+            self._set({name: columns[name] for name in self.variables})

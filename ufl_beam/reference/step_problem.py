@@ -58,18 +58,17 @@ class StepProblem:
 
     y: Array  # coordinates at the beginning of the step, see Frame; y1: at the latest iterate
     q: Array  # configuration at the beginning of the step, E y; q1: at the latest iterate
-    v: Array  # velocities at the beginning of the step; s: steps on which forces do work
+    v: Array  # velocities at the beginning of the step; s: steps on which inertia does work
     load: Array  # loads in the step
     coefficients: Any  # numbers of the scheme in the step
     stiff = 0  # 1: points that do not open have elastic tangents; 2: hinges are steep, too
     iterations = 0  # of Newton's method so far
 
     def __init__(
-        self, numbering: DofNumbering, scheme: Scheme, t: float, *, newton: Any,
-        comm: MPI.Intracomm,
-    ) -> None:  # fmt: skip
+        self, numbering: DofNumbering, scheme: Scheme, *, newton: Any, comm: MPI.Intracomm
+    ) -> None:
         self.scene, self.numbering, self.scheme = numbering.scene, numbering, scheme
-        self.t, self.newton, self.comm = t, newton, comm
+        self.newton, self.comm = newton, comm
         self.frame = frame = Frame(numbering, comm)
         self.fields, self.dynamic = Fields(frame, scheme), has_inertia(scheme)
         self.points = list[Points]()
@@ -87,19 +86,15 @@ class StepProblem:
         self._make_snes()
 
     def _set_masses_and_loads(self) -> None:
-        """Set masses of bodies and point masses, and forces of dead loads for factors of one.
-
-        Loads have forces on the scene, of which those along beams are also forces on cells.
-        """
-        numbering, loads, cells = self.numbering, self.scene.loads, self.frame.cells
+        """Set masses of bodies and point masses, and forces of dead loads for factors of one."""
+        numbering, loads = self.numbering, self.scene.loads
         self.masses: Array = np.zeros(numbering.size)
         self.of_loads = np.zeros((len(loads), numbering.size))
         for place, mass, inertia in point_masses(self.scene):
             np.add.at(self.masses, numbering.node(place), [mass, mass, inertia])
-        on_cells = [self.fields.load_on_cells(load) for load in loads]
-        self.of_loads_on_cells = np.reshape(on_cells, (len(loads), len(cells), 2, 3))
-        for load, forces, along in zip(loads, self.of_loads, self.of_loads_on_cells, strict=True):
-            np.add.at(forces, numbering.dofs[numbering.cells[cells]], along)
+        for load, forces in zip(loads, self.of_loads, strict=True):
+            values = self._assembled(self.fields.work_of(load)).array_r
+            np.add.at(forces, self.frame.dofs[: len(values)], values)
             self.comm.Allreduce(MPI.IN_PLACE, forces)
             if isinstance(load, PointLoad) and moves_with_node(load.place):
                 np.add.at(forces, numbering.node(load.place), [*load.force, load.moment])
@@ -166,34 +161,28 @@ class StepProblem:
         strains = fields.strains()
         for points in self.points:
             points.return_map(strains, stiff=self.stiff > 0)
-        r = self._assemble_forces()
+        further = sum(
+            (group.residual(self.q1, steep=self.stiff == 2) for group in self.connectors),
+            np.zeros(numbering.size),
+        )
+        r = self._assembled(fields.force)
         if self.dynamic:
             c = self.coefficients
             a, v = (row[0] * self.s + row[1] * self.v for row in (c.inertia, c.velocity))
             for A, rate in ((self.M, a), (self.damping, v)):  # equation (78)
                 self.rate.x.array[:] = rate[frame.dofs]
                 A.multAdd(self.rate.x.petsc_vec, r, r)
-            self.further += self.masses * (a + self.rayleigh[0] * v)
+            further += self.masses * (a + self.rayleigh[0] * v)
         frame.C.multTranspose(r, f)
-        f.array_w[:] += frame.rows @ (self.further - self.load)
+        f.array_w[:] += frame.rows @ (further - self.load)
         f.array_w[frame.fixed] = 0.0  # the guess has the prescribed motions
 
-    def _assemble_forces(self) -> PETSc.Vec:
-        """Return the forces of the mesh without inertia; also compute the forces of connectors."""
-        self.further: Array = np.zeros(self.numbering.size)
-        for group in self.connectors:
-            self.further += group.residual(self.q1, steep=self.stiff == 2)
+    def _assembled(self, work: fem.Form) -> PETSc.Vec:
+        """Return the forces on the mesh that do a virtual work."""
         self.r.x.array[:] = 0.0
-        fem.assemble_vector(self.r.x.array, self.fields.force)
+        fem.assemble_vector(self.r.x.array, work)
         self.r.x.scatter_reverse(la.InsertMode.add)
         return self.r.x.petsc_vec
-
-    def forces(self) -> Array:
-        """Return the forces of the scene at the latest residual, without loads; (size,)."""
-        forces, values = np.zeros(self.numbering.size), self.r.x.petsc_vec.array_r
-        np.add.at(forces, self.frame.dofs[: len(values)], values)
-        self.comm.Allreduce(MPI.IN_PLACE, forces)
-        return forces + self.further
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Compute the derivative at the point of the latest residual."""

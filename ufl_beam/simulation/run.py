@@ -44,7 +44,7 @@ from ufl_beam.simulation.diagnosis import (
     warn_of_rayleigh,
 )
 from ufl_beam.simulation.initial_state import StateOf, chosen_state, mesh_of, require_scheme
-from ufl_beam.simulation.reference_run import ReferenceInSpace, ReferenceRun
+from ufl_beam.simulation.reference_run import ReferenceInPlane, ReferenceInSpace
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_lengths import (
@@ -156,7 +156,6 @@ def simulate(
     files = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
     recorders, outputs = checked_recorders(record, comm, "simulate", *files)
     begin = time.perf_counter()
-    by_reference = isinstance(newton, Newton) and newton.reference
     if isinstance(dt, Adaptive):
         require_plain(newton, "adaptive steps, dt = Adaptive(...)")
     if checkpoint is not None:
@@ -174,9 +173,9 @@ def simulate(
             keeper = CheckpointFile(checkpoint, call, step, t1, recorders, comm)
             stack.callback(keeper.lock.unlock)
         kind: Any = Simulation
-        if by_reference:
+        if isinstance(newton, Newton) and newton.reference:
             in_space = isinstance(scene, Scene) and scene.in_space
-            kind = ReferenceInSpace if in_space else ReferenceRun
+            kind = ReferenceInSpace if in_space else ReferenceInPlane
         simulation = kind(scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm)
         solution: Solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin
@@ -202,7 +201,7 @@ def simulate(
             simulation, pace, recorders, bar, max_states=max_states, until=until, keeper=keeper,
             begin=begin,
         )  # fmt: skip
-        if not (by_reference or has_inertia(scheme)) and simulation.comm.rank == 0:
+        if not has_inertia(scheme) and simulation.comm.rank == 0:
             warn_of_instability(solution, simulation.equation, simulation.q)
     return solution
 
@@ -375,6 +374,3 @@ def require_times(t: tuple[float, float], call: str = "simulate") -> tuple[float
     if t1 <= t0:
         raise ArgumentError(f"{call}: the end t[1] = {t1:g} must come after the beginning {t0:g}")
     return float(t0), float(t1)
-
-
-# -- the reference solver --------------------------------------------------------------------------

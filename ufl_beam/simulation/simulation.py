@@ -326,6 +326,8 @@ class Simulation(Stepper):
         self.keep()
         steps, configurations = map(np.ascontiguousarray, (steps, configurations))
         columns, done = self._writer.columns, 0
+        if self._path is not None:
+            self._path.c.slack = math.inf  # the steps have been accepted before
         most = 1 + MOST_VALUES // columns.width
         self.time_loop.begin_of_run = self.t
         ends = (steps[:, 0] == steps[:, 1]) & (steps[:, 2] == 0)  # of whole steps, or divided ones

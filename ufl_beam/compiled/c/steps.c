@@ -696,9 +696,8 @@ int take_steps(time_loop *m, int steps, const double *ends, double seconds, int 
   return steps;
 }
 
-/* Accept given configurations at the ends of steps or substeps, see keep_substep, without solutions, and
- * write the states into `rows`. The configurations are in the axes of the plane. Returns the number of
- * steps. */
+/* Check and accept given configurations at the ends of steps or substeps, see keep_substep, without solutions,
+ * and write the states into `rows`. The configurations are in the axes of the plane. Returns the number of steps. */
 int repeat_steps(time_loop *m, int number, const double *steps, const double *configurations, double *rows)
 {
   equation *e = m->equation;
@@ -712,9 +711,10 @@ int repeat_steps(time_loop *m, int number, const double *steps, const double *co
     if (e->rotations) memcpy(e->base, m->q, m->size * sizeof *e->base);
     find_turning(e, e->unknowns);
     restart(e, EXACT);
+    find_size_of_loads(e);
     /* Laws with several branches find their branch in the first residual. */
     for (int i = 0; i < 2; ++i) residual(e, e->unknowns, e->residual, e->f);
-    if (!measure(m) || !accept_step(m)) return k;
+    if (!measure(m) || (m->path && !followed(m)) || !accept_step(m)) return k;
     keep_state(m, rows + (size_t)k * m->width);
   }
   return number;
