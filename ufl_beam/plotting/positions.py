@@ -84,11 +84,6 @@ def points_along(line: Array, fractions: Any) -> Array:
     return np.column_stack([np.interp(at, lengths, x) for x in line.T])
 
 
-def segments(line: Array) -> Array:
-    """Return segments of a line between its points, (x, y, x, y) of both ends; (n - 1, 4)."""
-    return np.hstack([line[:-1], line[1:]])
-
-
 def joined(lines: Iterable[Array]) -> Array:
     """Join lines with NaN between them, as one line for Matplotlib; (n, 2 or 3)."""
     pieces: list[Array] = [x for line in lines for x in (line, np.nan * np.ones_like(line[:1]))]
