@@ -21,7 +21,7 @@ from ufl_beam.discretization.cells_in_space import (
     CellsOfState,
     cell_axes,
     lost_numbers,
-    momentum_in_space,
+    momentum,
     rotated,
     rotation_from,
     rotation_vectors,
@@ -788,19 +788,7 @@ class States:
         """
         if not len(self.column("v")):
             raise ArgumentError("momentum: the run was static; there is none")
-        times, numbering = Product(mass_matrix(self.cells.fields)), self.numbering
-        if self.scene.in_space:
-            rows = [[self._row(x, n) for x in ("q", "v", TURNS)] for n in range(len(self))]
-            return np.array([momentum_in_space(numbering, q, times(v), z) for q, v, z in rows])
-        dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])
-        centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
-        _, first = np.unique(dofs[:, 0], return_index=True)
-        u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
-        X, Y = np.vstack([numbering.points, centers])[first].T
-
-        states = []
-        for n in range(len(self)):
-            q, p = self._row("q", n), times(self._row("v", n))
-            turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
-            states.append((p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()))
-        return np.array(states)
+        times, names = Product(mass_matrix(self.cells.fields)), ["q", "v"]
+        names += [TURNS] * self.scene.in_space
+        rows = ([self._row(name, n) for name in names] for n in range(len(self)))
+        return np.array([momentum(self.numbering, q, times(v), *z) for q, v, *z in rows])
