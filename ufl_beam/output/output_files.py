@@ -67,23 +67,21 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
     """
     owners: dict[object, str] = {}
     for owner, path in ((owner, path) for owner, paths in (*_in_use, *outputs) for path in paths):
-        identities: list[object] = []
         try:
-            identities = [real := os.path.realpath(path)]
-            status = os.stat(real)
-            same = (status.st_dev, status.st_ino)
-            identities = [real, same] if stat.S_ISREG(status.st_mode) else []
-        except OSError:
-            pass  # there is no file yet
+            status = os.stat(path)
+            if not stat.S_ISREG(status.st_mode):
+                continue
+            identity: object = (status.st_dev, status.st_ino)
+        except OSError:  # there is no file yet
+            identity = os.path.realpath(path)
         except ValueError as error:  # a null character
             raise ArgumentError(f"output {path} cannot be written: {error}") from None
-        for identity in identities:
-            writer = owners.setdefault(identity, owner)
-            if writer is not owner:
-                raise ArgumentError(
-                    f"{call}: {writer} and {owner} would both write {os.path.realpath(path)}; "
-                    "give one of them another path"
-                )
+        writer = owners.setdefault(identity, owner)
+        if writer is not owner:
+            raise ArgumentError(
+                f"{call}: {writer} and {owner} would both write {os.path.realpath(path)}; "
+                "give one of them another path"
+            )
 
 
 @contextmanager
@@ -279,7 +277,8 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
     try:
         arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray)}
         text = {n: v for n, v in content.items() if n not in arrays or v.dtype.hasobject}
-        np.savez(file, **{n: v for n, v in arrays.items() if n not in text})
+        kept: dict[str, Any] = {n: v for n, v in arrays.items() if n not in text}
+        np.savez(file, **kept)
         with zipfile.ZipFile(file, "a") as archive:
             archive.comment = f"{format}; written by ufl_beam {version()}; sha256 ".encode()
             archive.comment += bytes(DIGEST)
@@ -367,10 +366,10 @@ def read(path: Path, *formats: str) -> Content:
         if sum(member.file_size for member in archive.zip.infolist()) > len(data):
             raise ArgumentError("the file is damaged: its content is larger than the file")
         members = dict(archive)
-    text = json.loads(members.pop("text.json"))
+    text: Content = json.loads(members.pop("text.json"))
     if not all(isinstance(values, np.ndarray) for values in members.values()):
         raise ValueError("a member is neither text nor an array")
-    return {"version": by} | text | members
+    return {"version": by, **text, **members}
 
 
 def require_arrays(content: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:

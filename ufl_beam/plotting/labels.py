@@ -27,8 +27,6 @@ SIZE = 8.6, 6.2
 LEAST_WIDTH = 0.25  # least extent along an axis in space, as a fraction of the largest one
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 GAPS = (4.0, 14.0)  # candidate distances of a label from its point; points
-TICKS = 55.0, 26.0  # least distances of ticks along x and y; points
-MOST_TICKS = 8  # largest number of intervals between ticks along an axis
 SPACE = np.array([4.0, 0.0])  # further clearance between labels; points
 CLEARANCE = 2.0  # clearance around a label; points
 
@@ -170,9 +168,7 @@ def _in_picture(axes: Any, spots: Sequence[Spot]) -> list[Spot]:
 
 
 def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
-    """Fit the limits to the data, the size of a new figure to the limits, and numbers of ticks."""
-    from matplotlib.ticker import AutoLocator
-
+    """Fit the limits to the data, and the size of a new figure to the limits."""
     axes.autoscale_view()
     if ax is None:
         figure = style.parent_figure(axes)
@@ -187,13 +183,6 @@ def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
         least = np.minimum((max(LEAST[0] + bars, wide), LEAST[1] + high), MOST)
         figure.set_size_inches(np.clip(inches * span + around, least, MOST))
     axes.apply_aspect()
-    size = axes.get_window_extent().size
-    for axis, length, width in zip((axes.xaxis, axes.yaxis), size, TICKS, strict=True):
-        if isinstance(locator := axis.get_major_locator(), AutoLocator):
-            number = length * POINTS / style.parent_figure(axes).dpi / font_size(width)
-            locator.set_params(
-                nbins=min(max(1, int(number)), MOST_TICKS), steps=[1, 2, 5, 10], min_n_ticks=1
-            )
 
 
 def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
@@ -223,7 +212,7 @@ def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
             weight="bold" if bold else "normal",
             bbox={"facecolor": shade(WHITE), "edgecolor": "none", "alpha": 0.85, "pad": 0.8},
         )  # fmt: skip
-        half = mark.get_window_extent().size / 2
+        half = np.divide(mark.get_window_extent().size, 2)
         # The box is beyond the line that is perpendicular to the direction at the point.
         offsets = np.concatenate(
             [ways * (gap * point + np.abs(ways) @ half)[:, None] for gap in GAPS]
