@@ -270,13 +270,36 @@ class DeformedShape:
             return np.asarray(Rotation.from_rotvec(self.motion(place)[3:]).apply(x))
         return in_frame(x, 0.0, directions(self.rotation(place)))
 
-    def section_axes(self, fractions: Array) -> Array:
-        """Return axes 1, 2, 3 of sections in space as columns; (num_cells, fractions, 3, 3)."""
+    def axis_points(self, fractions: Array) -> Array:
+        """Return points of beams at fractions of cells; (num_cells, fractions, 2 or 3); m."""
         assert self.canvas.solution is not None
-        _, axes = self.canvas.solution.cells.axes
+        numbering = self.canvas.solution.numbering
+        points = numbering.mesh.weights(fractions) @ self.nodes[numbering.nodes_along_cells]
+        return np.asarray(points)
+
+    def section_axes(self, fractions: Array) -> Array:
+        """Return axes 1, 2, 3 of sections as columns; (num_cells, fractions, 3, 3).
+
+        In the plane, axis 2 is to the left of the drawn line.  At corners between cells of a beam
+        it bisects the angle; near a corner it leans towards the bisector.
+        """
+        assert self.canvas.solution is not None
+        solution, numbering = self.canvas.solution, self.canvas.solution.numbering
+        if not self.canvas.scene.in_space:
+            slopes = numbering.mesh.slopes(fractions)
+            ahead = unit_vectors(slopes @ self.nodes[numbering.nodes_along_cells])
+            lean = np.zeros((len(ahead), 2, 2))
+            k = np.flatnonzero(np.diff(numbering.beam_of_cell) == 0)
+            half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
+            lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
+            ahead = unit_vectors(ahead + np.column_stack([1.0 - fractions, fractions]) @ lean)
+            axes = np.tile(np.eye(3), (*ahead.shape[:2], 1, 1))
+            axes[..., :2, :2] = np.stack([ahead, normal(ahead)], axis=-1)
+            return axes
+        _, axes = solution.cells.axes
         if self.index is None:
             return np.repeat(axes[:, None], len(fractions), axis=1)
-        cells = self.canvas.solution.cells_in_space(self.index)
+        cells = solution.cells_in_space(self.index)
         return np.stack([cells.frames(s).as_matrix() @ axes for s in fractions], axis=1)
 
     def body_points(self, body: Body, points: Array) -> Array:
