@@ -492,11 +492,10 @@ class States:
     def _rotation_in_step(self, place: AttachmentPoint) -> Array:
         """Return the rotation of a place to which forces of steps belong; (n+1, 1 or 3); rad."""
         ends, d = self._ends(), self.numbering.displacements
-        weights, rotations = zip(*((w, x.displacement(place)[:, d:]) for w, x in ends), strict=True)
-        if not self.scene.in_space or len(ends) == 1:
-            return np.asarray(sum(w * x for w, x in zip(weights, rotations, strict=True)))
-        now, begun = rotations
-        return rotation_from(-now, weights[1] * rotation_from(now, begun))
+        (_, now), *begun = ((w, some.displacement(place)[:, d:]) for w, some in ends)
+        for weight, before in begun:
+            return rotation_from(-now, weight * rotation_from(now, before))
+        return now
 
     def _ends(self) -> list[tuple[float, States]]:
         """Return the states, and configurations at the beginnings of their steps, with weights."""

@@ -82,13 +82,13 @@ def fitted_canvas(
     ``size`` is the largest width and height of new axes, inch; the frame fills a fraction of them.
     """
     scene = subject.scene if isinstance(subject, States) else subject
-    points = Canvas(subject, magnify, 0.02 * scene.size, shown).points()
+    points = Canvas(subject, magnify, shown, unit=0.02 * scene.size).points()
     space = POINTS * np.array(size) if ax is None else style.lay_out(ax)
     if scene.in_space:  # beside the scales of three axes
         points, filled = points @ PICTURE[3].T, 0.6 * filled
     # A scene may be a single point.
     scale = max(*np.ptp(points, axis=0) / (filled * space), 1e-3 * scene.size)
-    return Canvas.at_scale(subject, magnify, scale, shown)
+    return Canvas(subject, magnify, shown, scale=scale)
 
 
 class Label(NamedTuple):

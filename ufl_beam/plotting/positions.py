@@ -103,37 +103,34 @@ class Canvas:
     """Scene or solution with the magnification and the size of symbols of a picture.
 
     Displacements are multiplied by ``magnify``.  ``shown`` are indices of the recorded times of a
-    solution that the picture shows; rails are long enough for these times.
+    solution that the picture shows; rails are long enough for these times.  Half the size of a
+    symbol is ``unit`` (m), or follows from the length ``scale`` (m) of a typographic point.
+
+    Attributes:
+        outside: Half the size of symbols of supports, loads and motions; m.
     """
 
     def __init__(
         self,
         subject: Scene | States,
         magnify: float,
-        unit: float,  # half the size of a symbol; m
         shown: Sequence[int] = (),
-        outside: float = 0.0,  # half the size of symbols of supports, loads, motions; m
-        scale: float = 0.0,  # length of a typographic point; m
+        *,
+        unit: float = 0.0,
+        scale: float = 0.0,
     ) -> None:
         require_number(magnify, "magnify", positive=True)
-        self.magnify, self.unit, self.outside, self.scale = magnify, unit, outside or unit, scale
+        self.magnify, self.shown, self.scale = magnify, shown, scale
         self.solution = subject if isinstance(subject, States) else None
-        self.scene = subject.scene if isinstance(subject, States) else subject
-        self.shown = shown
-        self.spots = attachment_points(self.scene)  # attachment points of bodies and of the ground
-
-    @classmethod
-    def at_scale(
-        cls, subject: Scene | States, magnify: float, scale: float, shown: Sequence[int] = ()
-    ) -> Canvas:
-        """Make a canvas for a plane picture, in which a typographic point is ``scale`` (m) long."""
-        scene = subject.scene if isinstance(subject, States) else subject
-        lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
-        typical = float(np.median(lengths)) / scale if lengths else math.inf
-        unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
-        few = len(scene.supports) + len(scene.loads) <= FEW
-        outside = max(unit, 0.7 * SYMBOL * scale) if few else unit
-        return cls(subject, magnify, unit, shown, outside, scale)
+        self.scene = scene = subject.scene if isinstance(subject, States) else subject
+        self.spots = attachment_points(scene)  # attachment points of bodies and of the ground
+        self.unit = self.outside = unit
+        if scale:
+            lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
+            typical = float(np.median(lengths)) / scale if lengths else math.inf
+            self.unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
+            few = len(scene.supports) + len(scene.loads) <= FEW
+            self.outside = max(self.unit, few * 0.7 * SYMBOL * scale)
 
     @property
     def undeformed(self) -> DeformedShape:

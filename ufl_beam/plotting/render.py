@@ -360,7 +360,7 @@ class Solids:
         """Canvas for bodies, joints, connectors and supports."""
         scene = self.solution.scene
         symbol = max(0.022 * scene.size, 0.7 * self.thickest[0])
-        return Canvas(self.solution, self.magnify, symbol, sorted(set(self.shown)))
+        return Canvas(self.solution, self.magnify, sorted({*self.shown}), unit=symbol)
 
     @cached_property
     def thickest(self) -> tuple[float, float]:
