@@ -65,7 +65,6 @@ from ufl_beam.output.state_rows import (
     JointHistory,
     connection,
     connector_indices,
-    new_rows,
     signs_on_second_place,
 )
 from ufl_beam.quadrature import gauss_rule
@@ -209,7 +208,7 @@ class States:
         ):
             most = MOST_VALUES // columns.width
             rows = max(number, min(max(len(self), LEAST_ROWS), most))
-            block = Block(columns, new_rows(rows, columns.width), 0)
+            block = Block(columns, np.zeros((rows, columns.width)), 0)
             self._blocks.append(block)
         return block.space[block.number : block.number + number]
 
