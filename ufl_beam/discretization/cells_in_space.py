@@ -221,13 +221,20 @@ def lost_numbers(numbering: DofNumbering, change: Array, before: Array, now: Arr
     return lost
 
 
-def velocity_in_space(
-    numbering: DofNumbering, place: AttachmentPoint, velocities: Vectors, turns: Vectors
+def velocity_at(
+    numbering: DofNumbering, place: AttachmentPoint, velocities: Vectors, states: Vectors
 ) -> Array:
-    """Return velocities of a place, and angular velocities about axes of its node; (n, 6)."""
+    """Return the velocities of a place in ``states``; (n, 3); m/s, m/s, rad/s.
+
+    In space ``states`` are :data:`TURNS`.  Angular velocities are about axes of the node; (n, 6).
+    """
     motion = values_at(numbering, place, velocities)
-    frames = turns_at(numbering, place, turns).as_matrix()
-    motion[:, :3] += np.einsum("nij,nj->ni", frames, np.cross(motion[:, 3:], arm(place)))
+    if numbering.displacements == 3:
+        frames = turns_at(numbering, place, states).as_matrix()
+        motion[:, :3] += (frames @ np.cross(motion[:, 3:], arm(place))[:, :, None])[:, :, 0]
+    elif isinstance(place, BodyPoint):
+        x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
+        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
     return motion
 
 

@@ -27,9 +27,9 @@ from ufl_beam.discretization.cells_in_space import (
     rotation_vectors,
     turned_further,
     turns_at,
-    velocity_in_space,
+    velocity_at,
 )
-from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
+from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
@@ -396,9 +396,8 @@ class States:
         """
         if not len(v := self.column("v")):
             raise ArgumentError("velocity: the run was static; there is none")
-        if not self.scene.in_space:
-            return velocity_at(self.numbering, place, self.column("q"), v)
-        return velocity_in_space(self.numbering, place, v, self.column(TURNS))
+        states = self.column(TURNS if self.scene.in_space else "q")
+        return velocity_at(self.numbering, place, v, states)
 
     def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""
