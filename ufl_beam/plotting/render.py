@@ -18,6 +18,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
 from ufl_beam.model.bodies import AttachmentPoint, require_place
 from ufl_beam.model.records import PositiveOrNone, Record
+from ufl_beam.output.paraview_files import in_three
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.films import WRITERS, Film, screen
@@ -405,7 +406,7 @@ class Solids:
                 halves.append((depth / 2, max(depth, 0.04 * size) / 2))
         of_cells = np.reshape(halves, (-1, 2))[numbering.beam_of_cell]
         ends = np.array([0.0, 1.0])
-        points, across = _raised(shape.axis_points(ends)), shape.section_axes(ends)[..., 1:]
+        points, across = in_three(shape.axis_points(ends)), shape.section_axes(ends)[..., 1:]
         corners = np.einsum("neik,ck,nk->neci", across, np.array(SQUARE), of_cells)
         return np.asarray(points[:, :, None] + corners)
 
@@ -432,7 +433,7 @@ class Solids:
                 radius = float(np.linalg.norm(points[0] - middle))
                 meshes[fill].append(Sphere(radius=radius, center=middle))
                 return
-            points = _raised(points)
+            points = in_three(points)
             if fill is not None:
                 plates[fill, low, high].append(points)
             if fill not in (FILLED, stroke.color):
@@ -461,17 +462,11 @@ class Solids:
         return {color: some for color, some in meshes.items() if some}
 
 
-def _raised(points: Array) -> Array:
-    """Return points in the plane with a third coordinate 0, and points in space; (..., 3)."""
-    flat = np.zeros((*points.shape[:-1], 3 - points.shape[-1]))
-    return np.concatenate([points, flat], axis=-1)
-
-
 def _lines(lines: list[Array]) -> Any:
     """Join lines in one mesh of separate segments, because tubes get thin at corners."""
     from pyvista import line_segments_from_points
 
-    ends = _raised(np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines]))
+    ends = in_three(np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines]))
     long = np.abs(ends[1::2] - ends[::2]).max(axis=1) > 1e-9 * np.ptp(ends)  # others have no tube
     return line_segments_from_points(ends[np.repeat(long, 2)])
 
