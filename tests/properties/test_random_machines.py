@@ -91,7 +91,7 @@ def test_nearly_all_machines_have_closed_ledgers():
 
 def amount(scene):
     """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
-    drawing = Drawing(Canvas.at_scale(scene, 1.0, scene.size / 300.0))
+    drawing = Drawing(Canvas(scene, 1.0, scale=scene.size / 300.0))
     strokes = [stroke for group in drawing.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
     labels = sum(map(len, drawing.labels.values()))

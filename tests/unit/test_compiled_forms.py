@@ -15,7 +15,7 @@ from scenes import clamped
 import ufl_beam as ub
 from ufl_beam.discretization import cell_functions, compiled_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering
-from ufl_beam.discretization.function_spaces import DolfinxFields, Fields, elastic_form, mass_form
+from ufl_beam.discretization.function_spaces import DolfinxFields, Fields, beam_forms
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import VERSION, fem
 
@@ -141,12 +141,12 @@ def test_functions_of_cells_are_what_dolfinx_assembles(mesh):
     space = space_with_dofs(meshed.mesh, of.space.ufl_element(), meshed.cell_dofs, size)
     now, w, u = fem.Function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
     now.x.array[:] = q
-    work = elastic_form(of, ub.Static())
+    work, _, mass, _ = beam_forms(of, ub.Static())
     assembled = fem.assemble_vector(fem.form(ufl.replace(work, {of.q1: now, of.w: w}))).array
     assert np.abs(forces - assembled).max() < 1e-13 * np.abs(assembled).max()
     rest = fem.Function(space)  # where the tangent of the forces is the stiffness
     tangent = ufl.derivative(ufl.replace(work, {of.q1: rest, of.w: w}), rest, u)
-    mass = ufl.replace(mass_form(of), {of.w: w, ufl.TrialFunction(of.space): u})
+    mass = ufl.replace(mass, {of.w: w, ufl.TrialFunction(of.space): u})
     for form, matrix in (
         (tangent, cell_functions.stiffness_matrix(fields)),
         (mass, cell_functions.mass_matrix(fields)),

@@ -13,8 +13,8 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.cells_in_space import velocity_in_space
-from ufl_beam.discretization.dof_numbering import turned, velocity_at
+from ufl_beam.discretization.cells_in_space import velocity_at
+from ufl_beam.discretization.dof_numbering import turned
 from ufl_beam.errors import ArgumentError, ArgumentTypeError, shorten
 from ufl_beam.model.bodies import GROUND, AttachmentPoint, BodyPoint, Place, node
 from ufl_beam.model.connector_laws import Controller, Guide, PrescribedForce, PrescribedMotion
@@ -265,10 +265,8 @@ class Outputs:
         else:
             dofs = numbering.node(place)
         each = (np.unique(dofs)[:, None] == np.arange(numbering.size)).astype(float)
-        if self._scene.in_space:
-            moved = velocity_in_space(numbering, place, each, np.array([small.turns] * len(each)))
-        else:
-            moved = velocity_at(numbering, place, np.array([small.q] * len(each)), each)
+        state = small.turns if self._scene.in_space else small.q
+        moved = velocity_at(numbering, place, each, state[None])
         return csr_array(moved[:, :3].T @ each)
 
     def _add_motion(self, x: Any, components: Sequence[int], kind: str) -> None:

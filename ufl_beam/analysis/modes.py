@@ -26,9 +26,9 @@ from ufl_beam.discretization.cells_in_space import (
     CellsOfState,
     cell_axes,
     turned_further,
-    velocity_in_space,
+    velocity_at,
 )
-from ufl_beam.discretization.dof_numbering import DofNumbering, velocity_at
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
@@ -118,10 +118,8 @@ class Shapes(Rich, ABC):
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
-        if self.scene.in_space:
-            moved = velocity_in_space(self.numbering, place, shape[None], self.turns[None])
-            return np.asarray(moved[0])
-        return np.asarray(velocity_at(self.numbering, place, self.q[None], shape[None])[0])
+        state = self.turns if self.scene.in_space else self.q
+        return np.asarray(velocity_at(self.numbering, place, shape[None], state[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.

@@ -164,20 +164,25 @@ class CellsOfState(NamedTuple):
         return np.stack(found, axis=1)
 
 
-def momentum_in_space(numbering: DofNumbering, q: Array, p: Array, turns: Array) -> Array:
-    """Return momentum and angular momentum about the origin of products p of mass and rates; (6,).
+def momentum(numbering: DofNumbering, q: Array, p: Array, turns: Array | None = None) -> Array:
+    """Return momentum and angular momentum about the origin of products p of mass and rates.
 
-    The shapes of ``q`` and ``p`` are (size,), of ``turns`` (nodes, 4).
+    The shapes of ``q`` and ``p`` are (size,), in space of ``turns`` (nodes, 4), and of the result
+    (3,), in space (6,).
     """
-    dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])
-    centres = np.reshape([body.center for body in numbering.scene.bodies], (-1, 3))
-    ground = np.zeros((len(dofs) - len(numbering.points) - len(centres), 3))
+    d, dofs = numbering.displacements, np.vstack([numbering.dofs, numbering.dofs_of_bodies])
+    centres = np.reshape([body.center for body in numbering.scene.bodies], (-1, d))
+    ground = np.zeros((len(dofs) - len(numbering.points) - len(centres), d))
     points = np.vstack([numbering.points, centres, ground])
     _, linear = np.unique(dofs[:, 0], return_index=True)
-    _, angular = np.unique(dofs[:, 3], return_index=True)
-    at, forces = points[linear] + q[dofs[linear, :3]], p[dofs[linear, :3]]
-    spins = _rotations(turns[angular]).apply(p[dofs[angular, 3:]])
-    return np.append(forces.sum(axis=0), np.cross(at, forces).sum(axis=0) + spins.sum(axis=0))
+    _, angular = np.unique(dofs[:, d], return_index=True)
+    at, forces = points[linear] + q[dofs[linear, :d]], p[dofs[linear, :d]]
+    spins = p[dofs[angular, d:]]
+    if turns is None:
+        moment = np.sum(at[:, :1] * forces[:, 1:] - at[:, 1:] * forces[:, :1], axis=0)
+    else:
+        moment, spins = np.cross(at, forces).sum(axis=0), _rotations(turns[angular]).apply(spins)
+    return np.append(forces.sum(axis=0), moment + spins.sum(axis=0))
 
 
 def turns_at(numbering: DofNumbering, place: AttachmentPoint, turns: Vectors) -> Rotation:
@@ -216,13 +221,20 @@ def lost_numbers(numbering: DofNumbering, change: Array, before: Array, now: Arr
     return lost
 
 
-def velocity_in_space(
-    numbering: DofNumbering, place: AttachmentPoint, velocities: Vectors, turns: Vectors
+def velocity_at(
+    numbering: DofNumbering, place: AttachmentPoint, velocities: Vectors, states: Vectors
 ) -> Array:
-    """Return velocities of a place, and angular velocities about axes of its node; (n, 6)."""
+    """Return the velocities of a place in ``states``; (n, 3); m/s, m/s, rad/s.
+
+    In space ``states`` are :data:`TURNS`.  Angular velocities are about axes of the node; (n, 6).
+    """
     motion = values_at(numbering, place, velocities)
-    frames = turns_at(numbering, place, turns).as_matrix()
-    motion[:, :3] += np.einsum("nij,nj->ni", frames, np.cross(motion[:, 3:], arm(place)))
+    if numbering.displacements == 3:
+        frames = turns_at(numbering, place, states).as_matrix()
+        motion[:, :3] += (frames @ np.cross(motion[:, 3:], arm(place))[:, :, None])[:, :, 0]
+    elif isinstance(place, BodyPoint):
+        x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
+        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
     return motion
 
 

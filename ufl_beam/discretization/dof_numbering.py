@@ -28,7 +28,6 @@ from ufl_beam.model.bodies import (
     Member,
     Node,
     Place,
-    arm,
     node,
 )
 from ufl_beam.model.checks import require_kind
@@ -496,14 +495,3 @@ def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) 
     nodes, weights = numbering.weights(place)
     dofs = numbering.dofs[nodes]
     return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
-
-
-def velocity_at(
-    numbering: DofNumbering, place: AttachmentPoint, states: Vectors, velocities: Vectors
-) -> Array:
-    """Return the velocities of a place in ``states``; (n, 3); m/s, m/s, rad/s."""
-    motion = values_at(numbering, place, velocities)
-    if isinstance(place, BodyPoint):
-        x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
-        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
-    return motion

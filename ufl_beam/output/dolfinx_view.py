@@ -15,19 +15,14 @@ from ufl_beam.blocks.beams import section_law
 from ufl_beam.discretization.function_spaces import (
     STIFFNESS,
     DolfinxFields,
-    derivative,
+    beam_forms,
     dofs_of_cells,
-    elastic_form,
-    imposed_at_points,
-    inelastic_forms,
     integrated,
-    mass_form,
 )
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_scheme import has_inertia
-from ufl_beam.model.imposed_strains import ImposedStrain
 from ufl_beam.output.internal_variables import in_cells
 
 
@@ -296,15 +291,13 @@ class DolfinxView:
         for function in (forms.q0, forms.q1):
             put_in_cells(function, self._view.q[self._fields.cell_dofs])
         numbering = self._view.subdomain.numbering
-        tables = section_law(self._view.inelastic, numbering)
-        for function, table in zip(self._around, tables, strict=False):  # none in elastic scenes
+        imposed = np.zeros((len(numbering.cells), numbering.mesh.degree, 6))
+        for beams in self._view.beams:
+            cells, strains = beams.imposed_strains()
+            imposed[cells] = np.tile(strains, 2)
+        tables = imposed, *section_law(self._view.inelastic, numbering)
+        for function, table in zip(self._at_points, tables, strict=True):
             put_in_cells(function, table[self.cells])
-        if self._imposed is not None:
-            table = np.zeros((len(numbering.cells), numbering.mesh.degree, 6))
-            for beams in self._view.beams:
-                cells, strains = beams.imposed_strains()
-                table[cells] = np.tile(strains, 2)
-            put_in_cells(self._imposed, table[self.cells].reshape(len(self.cells), -1))
         return forms
 
     @cached_property
@@ -313,16 +306,10 @@ class DolfinxView:
 
         The elastic stiffness is zero in cells with material points; b and D are zero in all others.
         """
-        element, scheme = self._fields.element, self._view.scheme
-        self._around: tuple[fem.Function, ...] = ()
-        imposed = any(isinstance(load, ImposedStrain) for load in self._view.scene.loads)
-        self._imposed: fem.Function | None = imposed_at_points(element) if imposed else None
-        work = elastic_form(element, scheme, imposed=imposed)
+        element = self._fields.element
+        work, tangent, mass, self._at_points = beam_forms(element, self._view.scheme)
         if self._view.inelastic:
-            points = inelastic_forms(element, scheme)
-            work, self._around = work + points.around, (points.b, points.D)
             cells = np.concatenate([beams.sections()[0] for beams in self._view.inelastic])
             dofs = dofs_of_cells(element.stiffness.function_space)
             element.stiffness.x.array[dofs[np.isin(self.cells, cells)]] = 0.0
-        q0, q1 = element.q0, element.q1
-        return BeamForms(q0, q1, work, derivative(work, q1), mass_form(element))
+        return BeamForms(element.q0, element.q1, work, tangent, mass)

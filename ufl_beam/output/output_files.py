@@ -67,23 +67,21 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
     """
     owners: dict[object, str] = {}
     for owner, path in ((owner, path) for owner, paths in (*_in_use, *outputs) for path in paths):
-        identities: list[object] = []
         try:
-            identities = [real := os.path.realpath(path)]
-            status = os.stat(real)
-            same = (status.st_dev, status.st_ino)
-            identities = [real, same] if stat.S_ISREG(status.st_mode) else []
-        except OSError:
-            pass  # there is no file yet
+            status = os.stat(path)
+            if not stat.S_ISREG(status.st_mode):
+                continue
+            identity: object = (status.st_dev, status.st_ino)
+        except OSError:  # there is no file yet
+            identity = os.path.realpath(path)
         except ValueError as error:  # a null character
             raise ArgumentError(f"output {path} cannot be written: {error}") from None
-        for identity in identities:
-            writer = owners.setdefault(identity, owner)
-            if writer is not owner:
-                raise ArgumentError(
-                    f"{call}: {writer} and {owner} would both write {os.path.realpath(path)}; "
-                    "give one of them another path"
-                )
+        writer = owners.setdefault(identity, owner)
+        if writer is not owner:
+            raise ArgumentError(
+                f"{call}: {writer} and {owner} would both write {os.path.realpath(path)}; "
+                "give one of them another path"
+            )
 
 
 @contextmanager
@@ -239,9 +237,6 @@ class WrongReader(ArgumentError):
     """Error of an intact file that this call cannot use; its message has the remedy."""
 
 
-NPY: Any = np.lib.format
-"""NumPy's reader and writer of arrays, which has no type annotations."""
-
 DIGEST = 64  # number of bytes of the checksum at the end of a file
 
 END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
@@ -280,16 +275,14 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
     require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()
     try:
-        with zipfile.ZipFile(file, "w") as archive:
+        arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray)}
+        text = {n: v for n, v in content.items() if n not in arrays or v.dtype.hasobject}
+        kept: dict[str, Any] = {n: v for n, v in arrays.items() if n not in text}
+        np.savez(file, **kept)
+        with zipfile.ZipFile(file, "a") as archive:
             archive.comment = f"{format}; written by ufl_beam {version()}; sha256 ".encode()
             archive.comment += bytes(DIGEST)
-            arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray)}
-            text = {n: v for n, v in content.items() if n not in arrays}
-            with archive.open("text.json", "w") as member:
-                member.write(json.dumps(text, default=plain).encode())
-            for name, values in arrays.items():
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                    NPY.write_array(member, values, allow_pickle=False)
+            archive.writestr("text.json", json.dumps(text, default=plain))
     except (TypeError, ValueError) as error:
         raise ArgumentError(
             f"{what} {path}{at} cannot be written: a state() must consist of numbers, "
@@ -319,7 +312,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
 
 def plain(value: Any) -> Any:
     """Convert arrays and numbers of NumPy for JSON; TypeError for other objects."""
-    if isinstance(value, np.generic | np.ndarray):
+    if isinstance(value, np.generic | np.ndarray) and not value.dtype.hasobject:
         return value.tolist()
     raise TypeError(repr(value))
 
@@ -369,16 +362,14 @@ def read(path: Path, *formats: str) -> Content:
             f"the file is a {actual}, written by version {by} of ufl_beam; this version, "
             f"{version()}, needs a {formats[0]}"
         )
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        if sum(member.file_size for member in archive.infolist()) > len(data):
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        if sum(member.file_size for member in archive.zip.infolist()) > len(data):
             raise ArgumentError("the file is damaged: its content is larger than the file")
-        content: Content = {"version": by} | json.loads(archive.read("text.json"))
-        for member in archive.namelist():
-            name, _, ending = member.rpartition(".")
-            if ending == "npy":
-                stored = io.BytesIO(archive.read(member))
-                content[name] = NPY.read_array(stored, allow_pickle=False)
-    return content
+        members = dict(archive)
+    text: Content = json.loads(members.pop("text.json"))
+    if not all(isinstance(values, np.ndarray) for values in members.values()):
+        raise ValueError("a member is neither text nor an array")
+    return {"version": by, **text, **members}
 
 
 def require_arrays(content: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:

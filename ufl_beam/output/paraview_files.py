@@ -79,7 +79,7 @@ class LineData:
         self._ends = [end for rod in rods for end in (rod.a, rod.b)]
         own = len(numbering.points) + np.arange(len(self._ends)).reshape(-1, 2)
         points = np.array([*numbering.points, *(end.point for end in self._ends)])
-        self.points: Array = _in_three(points)
+        self.points: Array = in_three(points)
         self.cells: Index = np.concatenate([numbering.pieces, own])
         self.kinds = np.append(np.zeros(len(numbering.pieces)), [rod.group for rod in rods])
         connectors = simulation.scene.all_connectors
@@ -96,7 +96,7 @@ class LineData:
             motions.append(("angular velocity", "velocity", of_nodes, now.velocity))
         for turning, moving, of_nodes, of_place in motions:
             values = np.array([*of_nodes, *(of_place(end)[0] for end in self._ends)])
-            at_points[moving] = _in_three(values[:, :d])
+            at_points[moving] = in_three(values[:, :d])
             at_points[turning] = values[:, 2] if d == 2 else values[:, d:]
         forces = simulation.section_forces()
         names = (Diagram if d == 2 else DiagramInSpace)._fields[1:]
@@ -115,10 +115,10 @@ class LineData:
         return at_points, of_lines
 
 
-def _in_three(vectors: Array) -> Array:
-    """Return vectors of the plane with a third component 0, and those in space as they are."""
-    flat = np.zeros((len(vectors), 3 - vectors.shape[1]))
-    return np.hstack([vectors, flat])
+def in_three(points: Array) -> Array:
+    """Return points in the plane with a third coordinate 0, and those in space; (..., 3)."""
+    flat = np.zeros((*points.shape[:-1], 3 - points.shape[-1]))
+    return np.concatenate([points, flat], axis=-1)
 
 
 # -- time series -----------------------------------------------------------------------------------

@@ -157,15 +157,6 @@ class Columns:
         return self._others[key]
 
 
-def new_rows(number: int, width: int) -> Array:
-    """Make rows of zeros.
-
-    Their memory is a bytearray: NumPy would request huge pages from 4 MiB on, and the first access
-    to a huge page takes longer.
-    """
-    return np.frombuffer(bytearray(8 * number * width)).reshape(number, width)
-
-
 @dataclass
 class Block:
     """Rows with the same columns, and space for more rows; rows are never moved in memory."""

@@ -21,15 +21,15 @@ from ufl_beam.discretization.cells_in_space import (
     CellsOfState,
     cell_axes,
     lost_numbers,
-    momentum_in_space,
+    momentum,
     rotated,
     rotation_from,
     rotation_vectors,
     turned_further,
     turns_at,
-    velocity_in_space,
+    velocity_at,
 )
-from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at, velocity_at
+from ufl_beam.discretization.dof_numbering import DofNumbering, turned, values_at
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
@@ -65,7 +65,6 @@ from ufl_beam.output.state_rows import (
     JointHistory,
     connection,
     connector_indices,
-    new_rows,
     signs_on_second_place,
 )
 from ufl_beam.quadrature import gauss_rule
@@ -209,7 +208,7 @@ class States:
         ):
             most = MOST_VALUES // columns.width
             rows = max(number, min(max(len(self), LEAST_ROWS), most))
-            block = Block(columns, new_rows(rows, columns.width), 0)
+            block = Block(columns, np.zeros((rows, columns.width)), 0)
             self._blocks.append(block)
         return block.space[block.number : block.number + number]
 
@@ -397,9 +396,8 @@ class States:
         """
         if not len(v := self.column("v")):
             raise ArgumentError("velocity: the run was static; there is none")
-        if not self.scene.in_space:
-            return velocity_at(self.numbering, place, self.column("q"), v)
-        return velocity_in_space(self.numbering, place, v, self.column(TURNS))
+        states = self.column(TURNS if self.scene.in_space else "q")
+        return velocity_at(self.numbering, place, v, states)
 
     def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place in the deformed scene; (n+1, 2 or 3); m."""
@@ -492,11 +490,10 @@ class States:
     def _rotation_in_step(self, place: AttachmentPoint) -> Array:
         """Return the rotation of a place to which forces of steps belong; (n+1, 1 or 3); rad."""
         ends, d = self._ends(), self.numbering.displacements
-        weights, rotations = zip(*((w, x.displacement(place)[:, d:]) for w, x in ends), strict=True)
-        if not self.scene.in_space or len(ends) == 1:
-            return np.asarray(sum(w * x for w, x in zip(weights, rotations, strict=True)))
-        now, begun = rotations
-        return rotation_from(-now, weights[1] * rotation_from(now, begun))
+        (_, now), *begun = ((w, some.displacement(place)[:, d:]) for w, some in ends)
+        for weight, before in begun:
+            return rotation_from(-now, weight * rotation_from(now, before))
+        return now
 
     def _ends(self) -> list[tuple[float, States]]:
         """Return the states, and configurations at the beginnings of their steps, with weights."""
@@ -788,19 +785,7 @@ class States:
         """
         if not len(self.column("v")):
             raise ArgumentError("momentum: the run was static; there is none")
-        times, numbering = Product(mass_matrix(self.cells.fields)), self.numbering
-        if self.scene.in_space:
-            rows = [[self._row(x, n) for x in ("q", "v", TURNS)] for n in range(len(self))]
-            return np.array([momentum_in_space(numbering, q, times(v), z) for q, v, z in rows])
-        dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])
-        centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
-        _, first = np.unique(dofs[:, 0], return_index=True)
-        u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
-        X, Y = np.vstack([numbering.points, centers])[first].T
-
-        states = []
-        for n in range(len(self)):
-            q, p = self._row("q", n), times(self._row("v", n))
-            turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
-            states.append((p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()))
-        return np.array(states)
+        times, names = Product(mass_matrix(self.cells.fields)), ["q", "v"]
+        names += [TURNS] * self.scene.in_space
+        rows = ([self._row(name, n) for name in names] for n in range(len(self)))
+        return np.array([momentum(self.numbering, q, times(v), *z) for q, v, *z in rows])

@@ -12,7 +12,6 @@ from base64 import b64encode
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -78,14 +77,13 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
                 "MP4 needs ffmpeg, GIF does not; install it by: pip install imageio-ffmpeg, or: "
                 "apt-get install ffmpeg"
             ) from error
-    first = next(frames)
-    height, width = first.shape[:2]
     # Not through a pipe: PETSc ends the interpreter if a broken pipe sends SIGPIPE.
     with tempfile.TemporaryDirectory() as folder:
         images, film = Path(folder, "images"), Path(folder, "film.mp4")
         with images.open("wb") as file:
-            for frame in chain([first], frames):
+            for frame in frames:
                 file.write(np.ascontiguousarray(frame).data)
+        height, width = frame.shape[:2]
         command = [
             program, "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
             "-s", f"{width}x{height}", "-r", str(fps), "-i", str(images),

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.connectors import can_yield
 from ufl_beam.plotting import style, symbols
@@ -24,7 +24,7 @@ from ufl_beam.plotting.inelastic_pictures import (
     open_hinges,
 )
 from ufl_beam.plotting.labels import Label, around, arrange, fitted_canvas, scene_axes
-from ufl_beam.plotting.positions import Canvas, DeformedShape, joined, normal, unit_vectors
+from ufl_beam.plotting.positions import Canvas, DeformedShape, joined
 from ufl_beam.plotting.style import BLUE, GREY, INK, RED, Artist, Axes, Figure, font_size, shade
 from ufl_beam.plotting.symbols import Stroke, draw_strokes
 from ufl_beam.simulation.solution import Solution
@@ -48,7 +48,7 @@ SIDES = {"V": ["V: in its direction"], "M": ["M: on the side of tension"]}
 ORDINATES = np.array(
     [[0, 1, 0], [0, 1, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, -1, 0]], dtype=np.float64
 )
-"""Directions of ordinates of (N, V2, V3, T, M2, M3) in axes of the section in space."""
+"""Directions of ordinates of (N, V2, V3, T, M2, M3) in axes of the section."""
 
 Values = tuple[Member, Array]
 """A beam, and values at points of its cells; (num_cells points, 1), of vectors (..., 2)."""
@@ -169,19 +169,17 @@ def _draw_diagrams(
     scale = 0.13 * math.hypot(*np.ptp(shape.nodes, axis=0)) / largest
     points = len(diagrams[0][1]) // len(numbering.cells_of(diagrams[0][0]))  # in a cell
     fractions = np.linspace(0.0, 1.0, points).astype(np.float64)
-    frames = shape.section_axes(fractions) if in_space else np.empty(0)
+    lines, frames = shape.axis_points(fractions), shape.section_axes(fractions)
+    columns = style.COLUMNS[what if in_space else {"V": "V2", "M": "M3"}.get(what, what)]
     rows: list[Array] = []
     outlines: defaultdict[str, list[Stroke]] = defaultdict(list)
     for beam, vectors in diagrams:
         cells = numbering.cells_of(beam)
-        axis, left = _along(solution, cells, shape.nodes, fractions)
+        axis = lines[cells].reshape(-1, lines.shape[-1])
+        sections = frames[cells].reshape(-1, 3, 3)[:, : axis.shape[1]]
         values = vectors[:, 0] if vectors.shape[1] == 1 else np.linalg.norm(vectors, axis=1)
         drawn = np.abs(values) > DRAWN_AS_ZERO * largest
-        if in_space:
-            across = ORDINATES[style.COLUMNS[what]]
-            ways = np.einsum("pik,ck->pci", frames[cells].reshape(-1, 3, 3), across)
-        else:
-            ways = left[:, None] * (-1.0 if what == "M" else 1.0)
+        ways = np.einsum("pik,ck->pci", sections, ORDINATES[columns])
         ordinates = scale * np.einsum("pc,pci->pi", np.where(drawn[:, None], vectors, 0.0), ways)
         for outline, peak, k in _areas(axis, axis + ordinates, np.where(drawn, values, 0.0)):
             color = RED if peak > 0 else BLUE
@@ -190,7 +188,7 @@ def _draw_diagrams(
         if beam in unmarked:
             unmarked.remove(beam)
             low, high = (len(axis) - 1) // 2, len(axis) // 2
-            (x, y), (right, up) = (axis[low] + axis[high]) / 2, left[high]
+            (x, y), (right, up) = (axis[low] + axis[high]) / 2, sections[high, :, 1]
             angle = math.degrees(math.atan2(up, right)) - 180.0  # at 0 the marker points up
             axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     draw_strokes(axes, outlines)
@@ -221,20 +219,6 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Label]:
         )
         for k in chosen.values()
     ]
-
-
-def _along(solution: Solution, cells: Index, nodes: Array, fractions: Array) -> tuple[Array, Array]:
-    """Return points of the drawn axis of a beam and vectors to its left; (n, 2 or 3) each."""
-    mesh, lines = solution.numbering.mesh, nodes[solution.numbering.nodes_along_cells[cells]]
-    ahead = unit_vectors(mesh.slopes(fractions) @ lines)
-    # Ordinates at corners between cells of a beam bisect the angle; ordinates near a corner lean
-    # towards the bisector.
-    lean = np.zeros((len(lines), 2, nodes.shape[1]))
-    half = unit_vectors(ahead[:-1, -1] + ahead[1:, 0])
-    lean[:-1, 1], lean[1:, 0] = half - ahead[:-1, -1], half - ahead[1:, 0]
-    ahead = ahead + np.column_stack([1.0 - fractions, fractions]) @ lean
-    axis, left = mesh.weights(fractions) @ lines, normal(unit_vectors(ahead))
-    return axis.reshape(-1, nodes.shape[1]), left.reshape(-1, nodes.shape[1])
 
 
 def _areas(axis: Array, tips: Array, values: Array) -> Iterator[tuple[Array, float, int]]:

@@ -15,8 +15,8 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.states import States
 from ufl_beam.plotting import style
-from ufl_beam.plotting.positions import FROM_A_SIDE, PICTURE, Canvas, directions, joined, segments
-from ufl_beam.plotting.style import BLUE, POINTS, RED, WHITE, Annotation, Axes, font_size, shade
+from ufl_beam.plotting.positions import FROM_A_SIDE, PICTURE, Canvas, directions
+from ufl_beam.plotting.style import POINTS, WHITE, Annotation, Axes, font_size, shade
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
 """Space for words and numbers around the axes, least size and largest size of a figure; inch."""
@@ -27,11 +27,8 @@ SIZE = 8.6, 6.2
 LEAST_WIDTH = 0.25  # least extent along an axis in space, as a fraction of the largest one
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 GAPS = (4.0, 14.0)  # candidate distances of a label from its point; points
-TICKS = 55.0, 26.0  # least distances of ticks along x and y; points
-MOST_TICKS = 8  # largest number of intervals between ticks along an axis
 SPACE = np.array([4.0, 0.0])  # further clearance between labels; points
 CLEARANCE = 2.0  # clearance around a label; points
-AREAS = RED, BLUE  # groups of filled areas that labels should not cover
 
 Spot = tuple[Array, Array]  # point, and the direction from there to a label; (2,) or (3,) each
 
@@ -85,13 +82,13 @@ def fitted_canvas(
     ``size`` is the largest width and height of new axes, inch; the frame fills a fraction of them.
     """
     scene = subject.scene if isinstance(subject, States) else subject
-    points = Canvas(subject, magnify, 0.02 * scene.size, shown).points()
+    points = Canvas(subject, magnify, shown, unit=0.02 * scene.size).points()
     space = POINTS * np.array(size) if ax is None else style.lay_out(ax)
     if scene.in_space:  # beside the scales of three axes
         points, filled = points @ PICTURE[3].T, 0.6 * filled
     # A scene may be a single point.
     scale = max(*np.ptp(points, axis=0) / (filled * space), 1e-3 * scene.size)
-    return Canvas.at_scale(subject, magnify, scale, shown)
+    return Canvas(subject, magnify, shown, scale=scale)
 
 
 class Label(NamedTuple):
@@ -127,7 +124,7 @@ def arrange(axes: Axes, ax: Axes | None, labels: Sequence[Label] = (), scale: fl
     axes.margins(MARGIN)
     drawn, written = axes.dataLim.frozen(), list[Any]()
     # Space for labels changes the scale, which moves the lines that labels should not cover.
-    for _ in range(3):
+    for _ in range(2):
         _fit(axes, ax, scale)
         for text in written:
             text.remove()
@@ -171,9 +168,7 @@ def _in_picture(axes: Any, spots: Sequence[Spot]) -> list[Spot]:
 
 
 def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
-    """Fit the limits to the data, the size of a new figure to the limits, and numbers of ticks."""
-    from matplotlib.ticker import AutoLocator
-
+    """Fit the limits to the data, and the size of a new figure to the limits."""
     axes.autoscale_view()
     if ax is None:
         figure = style.parent_figure(axes)
@@ -188,13 +183,6 @@ def _fit(axes: Axes, ax: Axes | None, scale: float) -> None:
         least = np.minimum((max(LEAST[0] + bars, wide), LEAST[1] + high), MOST)
         figure.set_size_inches(np.clip(inches * span + around, least, MOST))
     axes.apply_aspect()
-    size = axes.get_window_extent().size
-    for axis, length, width in zip((axes.xaxis, axes.yaxis), size, TICKS, strict=True):
-        if isinstance(locator := axis.get_major_locator(), AutoLocator):
-            number = length * POINTS / style.parent_figure(axes).dpi / font_size(width)
-            locator.set_params(
-                nbins=min(max(1, int(number)), MOST_TICKS), steps=[1, 2, 5, 10], min_n_ticks=1
-            )
 
 
 def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
@@ -202,15 +190,20 @@ def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
 
     A label that would cover a label before it is omitted.
     """
-    from matplotlib.transforms import Affine2D
+    from matplotlib.backends.backend_agg import RendererAgg
 
     if not labels:
         return []
     style.lay_out(axes)
-    per_pixel = POINTS / style.parent_figure(axes).dpi
-    to_points = axes.transData + Affine2D().scale(per_pixel)
-    lines, written = np.concatenate([*_obstacles(axes, to_points)]), list[Any]()
-    boxes = np.empty((0, 2, 2))  # lower and upper corners of the written labels
+    figure = style.parent_figure(axes)
+    point = figure.dpi / POINTS  # pixels
+    renderer = RendererAgg(*figure.bbox.size, figure.dpi)
+    for drawn in sorted([*axes.lines, *axes.collections], key=lambda artist: artist.get_zorder()):
+        drawn.draw(renderer)
+    # Squares of opacities, so that lines count more than areas
+    ink = np.square(np.asarray(renderer.buffer_rgba())[::-1, :, 3] / 255)
+    sums = np.pad(ink, ((1, 0), (1, 0))).cumsum(axis=0).cumsum(axis=1)
+    written, boxes = list[Any](), np.empty((0, 2, 2))  # corners of the written labels
     for text, color, spots, bold in labels:
         points, ways = (np.array(x) for x in zip(*spots, strict=True))
         mark = axes.annotate(
@@ -219,55 +212,25 @@ def write_labels(axes: Axes, labels: Sequence[Label]) -> list[Annotation]:
             weight="bold" if bold else "normal",
             bbox={"facecolor": shade(WHITE), "edgecolor": "none", "alpha": 0.85, "pad": 0.8},
         )  # fmt: skip
-        half = np.multiply(mark.get_window_extent().size, per_pixel / 2)
+        half = np.divide(mark.get_window_extent().size, 2)
         # The box is beyond the line that is perpendicular to the direction at the point.
-        offsets = np.concatenate([ways * (gap + np.abs(ways) @ half)[:, None] for gap in GAPS])
-        centers = np.tile(to_points.transform(points), (len(GAPS), 1)) + offsets
-        low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
+        offsets = np.concatenate(
+            [ways * (gap * point + np.abs(ways) @ half)[:, None] for gap in GAPS]
+        )
+        centers = np.tile(axes.transData.transform(points), (len(GAPS), 1)) + offsets
+        low, high = (centers + k * (half + CLEARANCE * point) for k in (-1, 1))
         covers = ((low[:, None] < boxes[:, 1]) & (high[:, None] > boxes[:, 0])).all(axis=2)
-        cost = lengths_inside(low, high, lines) + 0.1 * np.arange(len(centers))
+        (x, y), (right, top) = (
+            np.clip(np.rint(ends), 0, ink.shape[::-1]).astype(int).T for ends in (low, high)
+        )
+        inside = sums[top, right] - sums[y, right] - sums[top, x] + sums[y, x]
+        cost = inside / point**2 + 0.1 * np.arange(len(centers))
         best = int(np.argmin(np.where(covers.any(axis=1), np.inf, cost)))
         if covers[best].any():
             mark.remove()
             continue
-        mark.xy, mark.xyann = points[best % len(points)], offsets[best]
-        corners = centers[best] + [-half - SPACE, half + SPACE]
+        mark.xy, mark.xyann = points[best % len(points)], offsets[best] / point
+        reach = half + SPACE * point
+        corners = np.array([centers[best] - reach, centers[best] + reach])
         boxes, written = np.concatenate([boxes, corners[None]]), [*written, mark]
     return written
-
-
-def _obstacles(axes: Axes, to_points: Any) -> Iterator[Array]:
-    """Yield segments that labels should not cover; (n, 4); points."""
-    lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
-    yield np.empty((0, 4))
-    for collection in axes.collections:
-        outlines = [np.asarray(path.vertices) for path in collection.get_paths()]
-        lines += outlines
-        if collection.get_gid() in AREAS:
-            for outline in map(to_points.transform, outlines):
-                # Ordinates at and between the points of a diagram; the axis is the second half,
-                # before the point that closes the outline.
-                half = len(outline) // 2
-                feet = np.vstack([outline[:1], outline[-2:half:-1]])
-                ordinates = np.hstack([feet, outline[1 : half + 1]])
-                yield from (ordinates, (ordinates[1:] + ordinates[:-1]) / 2)
-    pieces = segments(to_points.transform(joined(lines)))
-    yield pieces[np.isfinite(pieces).all(axis=1)]
-    for line in axes.lines:
-        if line.get_linestyle() == "None":  # markers
-            diagonal = line.get_markersize() / 2 * np.array([-1, -1, 1, 1])
-            for ends in (diagonal, diagonal * (1, -1, 1, -1)):
-                yield np.tile(to_points.transform(line.get_xydata()), 2) + ends
-
-
-def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
-    """Sum the lengths of segments, (n, 4), inside boxes with corners ``low`` and ``high``."""
-    ends = np.sort(lines.reshape(-1, 2, 2), axis=1)
-    near = ((ends[:, 0] <= high.max(axis=0)) & (ends[:, 1] >= low.min(axis=0))).all(axis=1)
-    first, step = lines[None, near, :2], (lines[:, 2:] - lines[:, :2])[None, near]
-    lengths = np.linalg.norm(step[0], axis=1)
-    # In a direction perpendicular to it, a segment is either entirely inside or outside.
-    step = np.where(step == 0.0, 1e-99, step)
-    sides = (low[:, None] - first) / step, (high[:, None] - first) / step
-    enter, leave = np.minimum(*sides).max(axis=2), np.maximum(*sides).min(axis=2)
-    return np.asarray(np.maximum(np.minimum(leave, 1.0) - np.maximum(enter, 0.0), 0.0) @ lengths)

@@ -509,12 +509,11 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
     size, moment = math.hypot(*force), load.moment * largest if isinstance(load, LineLoad) else 0.0
     shares = factors / largest if largest else factors
     lengths = positions.lengths_along(axis)
+    tangents = unit_vectors(np.gradient(axis, lengths, axis=0))
     ways: Array = np.tile(force / (size or 1.0), (len(axis), 1))  # direction at each point
-    in_space = axis.shape[1] == 3
     if follows:
-        tangents = unit_vectors(np.gradient(axis, lengths, axis=0))
         frame = [tangents, normal(tangents)]
-        if in_space:
+        if axis.shape[1] == 3:
             beam: Any = load.beam
             third = unit_vectors(np.cross(tangents, beam.up))
             frame = [tangents, np.asarray(np.cross(third, tangents)), third]
@@ -530,26 +529,26 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
         rows = zip(points_along(axis, steps), intensity, np.column_stack(heading), strict=True)
         return [row for row in rows if abs(row[1]) > least]
 
+    def nearest(line: Array, at: Array) -> Array:
+        """Return the direction at the point of a line that is the nearest to ``at``."""
+        return np.asarray(ways[np.linalg.norm(line - at, axis=1).argmin()])
+
     def draw(ends: Array, share: float) -> None:
         ends = ends if share > 0 else ends[::-1]
         drawing.strokes["loads"] += _arrow(ends, RED, unit, hollow=follows, size=0.62)
 
     if size > 0.0:
-        direction, chord = force / size, axis[-1] - axis[0]
-        across = direction[1] if follows else normal(chord) @ direction / np.linalg.norm(chord)
-        heading, turned = ways[len(ways) // 2], follows and not in_space
-        if in_space:
-            across = np.linalg.norm(np.cross(chord, heading)) / np.linalg.norm(chord)
-        if abs(across) > 0.25:
+        along = np.sum(ways * tangents, axis=1, keepdims=True) * tangents
+        if np.linalg.norm(ways - along, axis=1).mean() > 0.25:
             height = (1.3 + 1.1 * size / drawing.line_load) * unit
-            key = load.beam, *np.round(direction, 6)
+            key = load.beam, *np.round(force / size, 6)
             low = drawing.stack(key, height + 0.35 * unit) + 0.3 * unit
             line = axis - (low + height * np.abs(shares))[:, None] * ways
             drawing.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
             for foot, share, heading in spaced(2.0 * unit, 0.5 * unit / height, ends=True):
                 draw(foot - np.outer((low + height * abs(share), low), heading), share)
             spots = [
-                (at, side * (left if (across if turned else left @ heading) < 0 else -left))
+                (at, -side * math.copysign(1.0, left @ nearest(line, at)) * left)
                 for at, left in _normals(line)
                 for side in (1.0, -1.0)
             ]
@@ -558,10 +557,7 @@ def _draw_line_load(drawing: Drawing, load: LoadAlongBeam) -> None:
             for at, share, heading in spaced(2.4 * unit, 0.05):
                 ends = np.outer((-0.9 * unit, 0.9 * unit), heading)
                 draw(at + aside * normal(heading) + ends, share)
-            sides = [
-                (at, direction[0] * left if follows else normal(direction))
-                for at, left in _normals(axis)
-            ]
+            sides = [(at, normal(nearest(axis, at))) for at, _ in _normals(axis)]
             spots = [(at + (aside + 0.3 * unit) * side, side) for at, side in sides]
         text = in_time(with_unit(size, "N/m"), load.amplitude) + ", follows" * follows
         drawing.write(text, RED, "line loads", spots)

@@ -84,11 +84,6 @@ def points_along(line: Array, fractions: Any) -> Array:
     return np.column_stack([np.interp(at, lengths, x) for x in line.T])
 
 
-def segments(line: Array) -> Array:
-    """Return segments of a line between its points, (x, y, x, y) of both ends; (n - 1, 4)."""
-    return np.hstack([line[:-1], line[1:]])
-
-
 def joined(lines: Iterable[Array]) -> Array:
     """Join lines with NaN between them, as one line for Matplotlib; (n, 2 or 3)."""
     pieces: list[Array] = [x for line in lines for x in (line, np.nan * np.ones_like(line[:1]))]
@@ -108,37 +103,34 @@ class Canvas:
     """Scene or solution with the magnification and the size of symbols of a picture.
 
     Displacements are multiplied by ``magnify``.  ``shown`` are indices of the recorded times of a
-    solution that the picture shows; rails are long enough for these times.
+    solution that the picture shows; rails are long enough for these times.  Half the size of a
+    symbol is ``unit`` (m), or follows from the length ``scale`` (m) of a typographic point.
+
+    Attributes:
+        outside: Half the size of symbols of supports, loads and motions; m.
     """
 
     def __init__(
         self,
         subject: Scene | States,
         magnify: float,
-        unit: float,  # half the size of a symbol; m
         shown: Sequence[int] = (),
-        outside: float = 0.0,  # half the size of symbols of supports, loads, motions; m
-        scale: float = 0.0,  # length of a typographic point; m
+        *,
+        unit: float = 0.0,
+        scale: float = 0.0,
     ) -> None:
         require_number(magnify, "magnify", positive=True)
-        self.magnify, self.unit, self.outside, self.scale = magnify, unit, outside or unit, scale
+        self.magnify, self.shown, self.scale = magnify, shown, scale
         self.solution = subject if isinstance(subject, States) else None
-        self.scene = subject.scene if isinstance(subject, States) else subject
-        self.shown = shown
-        self.spots = attachment_points(self.scene)  # attachment points of bodies and of the ground
-
-    @classmethod
-    def at_scale(
-        cls, subject: Scene | States, magnify: float, scale: float, shown: Sequence[int] = ()
-    ) -> Canvas:
-        """Make a canvas for a plane picture, in which a typographic point is ``scale`` (m) long."""
-        scene = subject.scene if isinstance(subject, States) else subject
-        lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
-        typical = float(np.median(lengths)) / scale if lengths else math.inf
-        unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
-        few = len(scene.supports) + len(scene.loads) <= FEW
-        outside = max(unit, 0.7 * SYMBOL * scale) if few else unit
-        return cls(subject, magnify, unit, shown, outside, scale)
+        self.scene = scene = subject.scene if isinstance(subject, States) else subject
+        self.spots = attachment_points(scene)  # attachment points of bodies and of the ground
+        self.unit = self.outside = unit
+        if scale:
+            lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
+            typical = float(np.median(lengths)) / scale if lengths else math.inf
+            self.unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)
+            few = len(scene.supports) + len(scene.loads) <= FEW
+            self.outside = max(self.unit, few * 0.7 * SYMBOL * scale)
 
     @property
     def undeformed(self) -> DeformedShape:
@@ -275,13 +267,36 @@ class DeformedShape:
             return np.asarray(Rotation.from_rotvec(self.motion(place)[3:]).apply(x))
         return in_frame(x, 0.0, directions(self.rotation(place)))
 
-    def section_axes(self, fractions: Array) -> Array:
-        """Return axes 1, 2, 3 of sections in space as columns; (num_cells, fractions, 3, 3)."""
+    def axis_points(self, fractions: Array) -> Array:
+        """Return points of beams at fractions of cells; (num_cells, fractions, 2 or 3); m."""
         assert self.canvas.solution is not None
-        _, axes = self.canvas.solution.cells.axes
+        numbering = self.canvas.solution.numbering
+        points = numbering.mesh.weights(fractions) @ self.nodes[numbering.nodes_along_cells]
+        return np.asarray(points)
+
+    def section_axes(self, fractions: Array) -> Array:
+        """Return axes 1, 2, 3 of sections as columns; (num_cells, fractions, 3, 3).
+
+        In the plane, axis 2 is to the left of the drawn line.  At corners between cells of a beam
+        it bisects the angle; near a corner it leans towards the bisector.
+        """
+        assert self.canvas.solution is not None
+        solution, numbering = self.canvas.solution, self.canvas.solution.numbering
+        if not self.canvas.scene.in_space:
+            slopes = numbering.mesh.slopes(fractions)
+            ahead = unit_vectors(slopes @ self.nodes[numbering.nodes_along_cells])
+            lean = np.zeros((len(ahead), 2, 2))
+            k = np.flatnonzero(np.diff(numbering.beam_of_cell) == 0)
+            half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
+            lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
+            ahead = unit_vectors(ahead + np.column_stack([1.0 - fractions, fractions]) @ lean)
+            axes = np.tile(np.eye(3), (*ahead.shape[:2], 1, 1))
+            axes[..., :2, :2] = np.stack([ahead, normal(ahead)], axis=-1)
+            return axes
+        _, axes = solution.cells.axes
         if self.index is None:
             return np.repeat(axes[:, None], len(fractions), axis=1)
-        cells = self.canvas.solution.cells_in_space(self.index)
+        cells = solution.cells_in_space(self.index)
         return np.stack([cells.frames(s).as_matrix() @ axes for s in fractions], axis=1)
 
     def body_points(self, body: Body, points: Array) -> Array:

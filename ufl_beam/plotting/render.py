@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import gc
 from collections import defaultdict
-from collections.abc import Collection, Generator, Iterable, Sequence
+from collections.abc import Collection, Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,8 +16,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
-from ufl_beam.model.bodies import AttachmentPoint, BodyPoint, Member, Place, require_place
+from ufl_beam.model.bodies import AttachmentPoint, require_place
 from ufl_beam.model.records import PositiveOrNone, Record
+from ufl_beam.output.paraview_files import in_three
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.films import WRITERS, Film, screen
@@ -27,14 +28,11 @@ from ufl_beam.plotting.positions import (
     UP_IN_SPACE,
     Canvas,
     DeformedShape,
-    directions,
     evenly,
-    in_frame,
-    normal,
     picture_axes,
     unit_vectors,
 )
-from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin, disc
+from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Stroke, disc
 from ufl_beam.simulation.solution import Solution
 
 QUANTITIES = {**{name: style.resultant(name) for name in "NVM"}, "rotation": ("rotation", "rad")}
@@ -45,11 +43,15 @@ PIN = "#707070"  # colour of joints
 SLENDER = 0.012  # least size of a drawn cross-section in space, as a part of the scene's size
 ROUND = 20  # number of points of an outline in space from which it is drawn as a ball
 
+HALF_WIDTHS = {
+    "bodies": 0.4, "centres": 0.48, "joints": 0.45, "connectors": 0.45, "supports": 0.6,
+    "beams": 0.7,
+}  # fmt: skip
+"""Halves of the widths of symbols, as fractions of the width of beams."""
+
 SQUARE = (1, 1), (-1, 1), (-1, -1), (1, -1)  # corners of a cross-section, as fractions of its size
 
 Direction = tuple[float, float, float]
-Meshes = defaultdict[str, list[Any]]  # by colour
-Lines = defaultdict[tuple[str, float], list[Array]]  # by colour and width
 
 
 def _require_direction(value: Any, what: str) -> Direction | None:
@@ -350,7 +352,7 @@ class Solids:
     def box(self) -> Array:
         """Return the lower and upper corner of the whole motion, beside the followed place; m."""
         points, margin = self.canvas.points(self.camera.follow), 2.2 * self.canvas.unit
-        half = [self.thickest(self.solution.scene.beams)[1] / 2] * (3 - points.shape[1])
+        half = [self.thickest[1] / 2] * (3 - points.shape[1])
         low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
         return np.array([[*low, *np.negative(half)], [*high, *half]])
 
@@ -358,18 +360,13 @@ class Solids:
     def canvas(self) -> Canvas:
         """Canvas for bodies, joints, connectors and supports."""
         scene = self.solution.scene
-        symbol = max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
-        return Canvas(self.solution, self.magnify, symbol, sorted(set(self.shown)))
+        symbol = max(0.022 * scene.size, 0.7 * self.thickest[0])
+        return Canvas(self.solution, self.magnify, sorted({*self.shown}), unit=symbol)
 
-    def thickest(self, objects: Iterable[Member | AttachmentPoint]) -> tuple[float, float]:
-        """Return the largest depth (in the plane) and width of beams; m.
-
-        ``objects`` are beams or places; points of bodies do not count.  The width is at least 4 %
-        of the scene's size.
-        """
-        beams = [
-            x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, BodyPoint)
-        ]
+    @cached_property
+    def thickest(self) -> tuple[float, float]:
+        """Largest depth and width of beams in the plane; at least 4 % of the scene wide; m."""
+        beams = self.solution.scene.beams
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
         return depth, max(depth, 0.04 * self.solution.scene.size)
 
@@ -385,140 +382,101 @@ class Solids:
         """Make a hexahedron for each cell of the beams, with values that colours show."""
         from pyvista import CellType, UnstructuredGrid
 
-        corners = self.corners_in_space(shape) if self.in_space else self.corners(n, shape)
-        points = corners.reshape(-1, 3)  # for each cell, as values may jump
+        points = self.corners(shape).reshape(-1, 3)  # for each cell, as values may jump
         hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
         mesh = UnstructuredGrid(hexahedra, points)
         mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
         return mesh
 
-    def corners(self, n: int, shape: DeformedShape) -> Array:
+    def corners(self, shape: DeformedShape) -> Array:
         """Return corners of cross-sections at both ends of cells; (num_cells, 2, 4, 3); m.
 
-        Cross-sections rotate with ψ.  At corners between cells of a beam they bisect the angle.
-        """
-        numbering = self.solution.numbering
-        vertices = np.arange(numbering.cells.max(initial=-1) + 1)
-        along = unit_vectors(np.diff(numbering.points[numbering.cells], axis=1)[:, 0])
-        sizes = np.reshape([self.thickest([beam]) for beam in self.solution.scene.beams], (-1, 2))
-        mean, halves = np.zeros((len(vertices), 2)), np.zeros((len(vertices), 2))
-        for end in numbering.cells.T:
-            mean[end] += along  # no vertex is the same end of two cells
-            halves[end] = sizes[numbering.beam_of_cell] / 2
-        angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][numbering.dofs[vertices, 2]]
-        depth, width = halves.T
-        left = depth[:, None] * normal(directions(angle))
-        corners = [
-            np.column_stack([shape.nodes[vertices] + sign * left, side * width])
-            for sign, side in SQUARE
-        ]
-        return np.stack(corners, axis=1)[numbering.cells]
-
-    def corners_in_space(self, shape: DeformedShape) -> Array:
-        """Return the same in space, where cells turn and twist with their nodes.
-
-        Beams have the depth of the section, and the width of a rectangle with its bending
-        stiffnesses.
+        Beams have the depth of the section.  In the plane their width is the depth or more, in
+        space that of a rectangle with the bending stiffnesses of the section.
         """
         numbering, size = self.solution.numbering, self.solution.scene.size
         halves = []
         for section in (beam.section for beam in self.solution.scene.beams):
-            aspect = np.sqrt(float(section.EI2 or 0.0) / section.EI)
-            depth = max(self.thickness * section.depth, SLENDER * size * max(1.0, 1 / aspect))
-            halves.append((depth / 2, max(depth * aspect, SLENDER * size) / 2))
+            depth = self.thickness * float(section.depth)
+            if self.in_space:
+                aspect = np.sqrt(float(section.EI2 or 0.0) / section.EI)
+                depth = max(depth, SLENDER * size * max(1.0, 1 / aspect))
+                halves.append((depth / 2, max(depth * aspect, SLENDER * size) / 2))
+            else:
+                halves.append((depth / 2, max(depth, 0.04 * size) / 2))
         of_cells = np.reshape(halves, (-1, 2))[numbering.beam_of_cell]
-        across = shape.section_axes(np.array([0.0, 1.0]))[..., 1:]  # (num_cells, 2, 3, 2)
+        ends = np.array([0.0, 1.0])
+        points, across = in_three(shape.axis_points(ends)), shape.section_axes(ends)[..., 1:]
         corners = np.einsum("neik,ck,nk->neci", across, np.array(SQUARE), of_cells)
-        return np.asarray(shape.nodes[numbering.cells][:, :, None] + corners)
+        return np.asarray(points[:, :, None] + corners)
 
     def others(self, n: int, shape: DeformedShape) -> dict[str, list[Any]]:
         """Make meshes of bodies, joints, connectors, masses and supports, by their colours.
 
-        In the plane filled areas are blocks; in space they are balls and plates.  Lines are rods.
+        Areas are plates, discs in space balls, and lines rods.
         """
+        from pyvista import Sphere
+
+        unit, (depth, width) = shape.canvas.unit, self.thickest
+        towards = np.array([0.0, 0.0, 1.0])  # the viewer
+        if self.in_space:
+            depth, width, towards = 0.0, 0.6 * unit, -unit_vectors(FROM_A_SIDE)
         meshes: defaultdict[str, list[Any]] = defaultdict(list)
         lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
-        (self._add_in_space if self.in_space else self._add)(n, shape, meshes, lines)
+        plates: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
+
+        def add(stroke: Stroke, low: float, high: float) -> None:
+            """Add an area between two heights above the plane of the picture, or its edge."""
+            points, fill = stroke.points, stroke.fill
+            if fill is not None and self.in_space and len(points) > ROUND:
+                middle = points[:-1].mean(axis=0)
+                radius = float(np.linalg.norm(points[0] - middle))
+                meshes[fill].append(Sphere(radius=radius, center=middle))
+                return
+            points = in_three(points)
+            if fill is not None:
+                plates[fill, low, high].append(points)
+            if fill not in (FILLED, stroke.color):
+                height = high if fill is not None or stroke.layer > MIDDLE else 0.0
+                lines[stroke.color, stroke.weight].append(points + height * towards)
+
+        for group, strokes in symbols.all_symbols(shape).items():
+            for stroke in strokes if group in HALF_WIDTHS else ():
+                half = HALF_WIDTHS["beams" if stroke.layer >= FRONT else group] * width
+                low, high = (half, 1.1 * half) if stroke.layer > MIDDLE else (-half, half)
+                add(stroke, low, high)
+        radius = max(depth / 2, 0.4 * unit)  # of pins, as thick as beams
+        dots = [(at, PIN, radius, 0.62 if rotates else 0.51) for at, rotates in symbols.pins(shape)]
+        dots += [
+            (x.at, style.ORANGE, radius, 0.62) for x in open_hinges(self.solution, n, shape.at)
+        ]
+        masses = self.solution.scene.masses
+        dots += [(shape.at(mass.place), style.INK, 1.1 * unit, 0.7) for mass in masses]
+        for at, color, r, half in dots:
+            add(disc(at, r, color, color), -half * width, half * width)
+        for (color, low, high), outlines in plates.items():
+            meshes[color].append(_extruded(outlines, low * towards, high * towards))
         for (color, weight), several in lines.items():
-            radius = weight * shape.canvas.unit / 20.0
-            rod = _lines(several).tube(radius=radius, n_sides=12)
+            rod = _lines(several).tube(radius=weight * unit / 20.0, n_sides=12)
             meshes[color] += [rod] if rod.n_points else []
         return {color: some for color, some in meshes.items() if some}
-
-    def _add(self, n: int, shape: DeformedShape, meshes: Meshes, lines: Lines) -> None:
-        """Add blocks and lines of a scene in the plane."""
-        scene, unit = self.solution.scene, shape.canvas.unit
-        body, front = self.thickest(())[1], 0.7 * self.thickest(scene.beams)[1]
-        blocks: defaultdict[tuple[str, float, float], list[Array]] = defaultdict(list)
-        for strokes, half in (
-            (symbols.bodies(shape), 0.4 * body),
-            (symbols.centres(shape), 0.48 * body),
-            (symbols.rods(shape), 0.1 * body),
-            (symbols.rails(shape), 0.45 * body),
-            (symbols.connectors(shape), 0.45 * body),
-        ):
-            for points, color, weight, fill, layer in strokes:
-                base = front if layer >= FRONT else half
-                low, high = (-half, half) if layer <= MIDDLE else (base, 1.1 * base)
-                if fill is not None:
-                    blocks[fill, low, high].append(points)
-                if fill != FILLED:
-                    z = 0.0 if fill is None and layer <= MIDDLE else high
-                    lines[color, weight].append(np.insert(points, 2, z, axis=1))
-        pins = [(pin, PIN) for pin in symbols.pins(shape)]
-        for hinge in open_hinges(self.solution, n, shape.at):
-            pins.append((Pin(hinge.at, True, (hinge.place,)), style.ORANGE))
-        for pin, color in pins:  # as thick as the joined beams
-            depth, width = self.thickest(pin.places)
-            radius = max(depth / 2, 0.4 * unit if pin.rotates or not depth else 0.0)
-            half = width * (0.62 if pin.rotates else 0.51)
-            blocks[color, -half, half].append(disc(pin.at, radius, color, color).points)
-        for mass in scene.masses:
-            dot = disc(shape.at(mass.place), 1.1 * unit, style.INK, style.INK).points
-            blocks[style.INK, -front, front].append(dot)
-        for at, angle, symbol, color, place in symbols.support_symbols(shape):
-            half, ahead = 0.6 * self.thickest([place])[1], unit * directions(angle)
-            blocks[color, -half, half] += [in_frame(x, at, ahead) for x in symbol]
-        for (color, low, high), outlines in blocks.items():
-            meshes[color].append(_extruded(outlines, low, high))
-
-    def _add_in_space(self, _: int, shape: DeformedShape, meshes: Meshes, lines: Lines) -> None:
-        """Add balls, plates and lines of a scene in space."""
-        from pyvista import PolyData, Sphere
-
-        step = 0.6 * shape.canvas.unit * unit_vectors(FROM_A_SIDE)
-        for group, strokes in symbols.all_symbols(shape).items():
-            for points, color, weight, fill, _layer in strokes:
-                color = PIN if group in ("pins", "joints") and color == style.INK else color
-                if fill is None:
-                    lines[color, weight].append(points)
-                    continue
-                middle, color = points[:-1].mean(axis=0), color if fill == style.WHITE else fill
-                if len(points) > ROUND:
-                    radius = float(np.linalg.norm(points[0] - middle))
-                    meshes[color].append(Sphere(radius=radius, center=middle))
-                else:
-                    corners = points[:-1] - step / 2
-                    plate = PolyData(corners, [len(corners), *range(len(corners))])
-                    meshes[color].append(plate.triangulate().extrude(step, capping=True))
 
 
 def _lines(lines: list[Array]) -> Any:
     """Join lines in one mesh of separate segments, because tubes get thin at corners."""
     from pyvista import line_segments_from_points
 
-    ends = np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])
-    ends = np.insert(ends, 2, 0.0, axis=1) if ends.shape[1] == 2 else ends
+    ends = in_three(np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines]))
     long = np.abs(ends[1::2] - ends[::2]).max(axis=1) > 1e-9 * np.ptp(ends)  # others have no tube
     return line_segments_from_points(ends[np.repeat(long, 2)])
 
 
-def _extruded(outlines: Sequence[Array], low: float, high: float) -> Any:
-    """Extrude closed outlines to blocks between the planes z = ``low`` and ``high``; m."""
+def _extruded(outlines: Sequence[Array], low: Array, high: Array) -> Any:
+    """Extrude closed plane outlines from ``low`` to ``high``; m."""
     from pyvista import PolyData
 
-    flat = np.insert(np.concatenate([outline[:-1] for outline in outlines]), 2, low, axis=1)
+    points = low + np.concatenate([outline[:-1] for outline in outlines])
     ends = np.cumsum([len(outline) - 1 for outline in outlines])
-    faces = np.split(np.arange(len(flat)), ends[:-1])
-    solid = PolyData(flat, np.concatenate([[len(face), *face] for face in faces])).triangulate()
-    return solid.extrude((0.0, 0.0, high - low), capping=True)
+    faces = np.split(np.arange(len(points)), ends[:-1])
+    solid = PolyData(points, np.concatenate([[len(face), *face] for face in faces])).triangulate()
+    return solid.extrude(high - low, capping=True)

@@ -141,10 +141,11 @@ def _save(figure: Figure, *args: Any, **options: Any) -> None:
     Labels are at powers of ten if at least three are in view.  Otherwise they are at 1, 2 and 5
     times powers of ten if at least two are in view, or else at equal steps.
     """
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+    from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, NullFormatter
 
     if active_comm().rank > 0:
         return
+    powers = LogFormatterSciNotation(minor_thresholds=(np.inf, np.inf))  # labels all ticks
     fine, equal = LogLocator(subs=(1.0, 2.0, 5.0)), MaxNLocator(5, steps=[1, 2, 5, 10])
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         if axis.get_scale() == "log" and axis.isDefault_majloc:
@@ -153,16 +154,9 @@ def _save(figure: Figure, *args: Any, **options: Any) -> None:
                 if sum(low <= tick <= high for tick in locator.tick_values(low, high)) >= least:
                     break
             axis.set_major_locator(locator)
-            axis.set_major_formatter("{x:g}" if low > 5e-5 and high < 2e5 else _power_of_ten)
+            axis.set_major_formatter("{x:g}" if low > 5e-5 and high < 2e5 else powers)
             axis.set_minor_formatter(NullFormatter())
     type(figure).savefig(figure, *args, **options)
-
-
-def _power_of_ten(value: float, _: float) -> str:
-    """Write a number as a multiple of a power of ten."""
-    factor, power = f"{value:.3e}".split("e")
-    before = f"{float(factor):g}\\cdot" if float(factor) != 1.0 else ""
-    return f"${before}10^{{{int(power)}}}$"
 
 
 def png(figure: Figure) -> tuple[bytes, dict[str, int]]:

@@ -101,8 +101,6 @@ def disc(at: Array, radius: float, color: str, fill: str, layer: float = PINS) -
 
 # -- supports ----------------------------------------------------------------------------------
 
-Outline = tuple[tuple[float, float], ...]
-
 _TRIANGLE = ((0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0))
 _CLAMP = ((-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0))
 _PLATE = ((-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8))
@@ -114,19 +112,12 @@ SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
 The supported place is the origin, and the beam is above."""
 
 
-class SupportSymbol(NamedTuple):
-    """Symbol of a support, or of a point of the ground."""
+def supports(shape: DeformedShape) -> Iterator[Stroke]:
+    """Draw supports, and points of the ground with joints or connectors.
 
-    at: Array  # (2,) or (3,); m
-    angle: float  # rotation of the symbol in the picture; rad
-    outlines: tuple[Outline, ...]
-    color: str  # orange if the support moves
-    place: AttachmentPoint
-
-
-def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
-    """Yield symbols of supports, and of points of the ground with joints or connectors."""
-    scene = shape.canvas.scene
+    Supports that do not move are on hatched ground.
+    """
+    scene, unit = shape.canvas.scene, shape.canvas.outside
     # Place, colour, index of SUPPORTS, direction away from the support, angle unless clamped
     symbols: list[tuple[AttachmentPoint, str, int, float, float]] = []
     for support in scene.supports:
@@ -161,17 +152,11 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
             angle = inward - math.pi / 2
         elif math.sin(inward - angle) < -0.5:  # the symbol would lie on the beam
             angle += math.pi
-        yield SupportSymbol(shape.at(place), angle, SUPPORTS[fixed], color, place)
-
-
-def supports(shape: DeformedShape) -> Iterator[Stroke]:
-    """Draw supports; supports that do not move are on hatched ground."""
-    unit = shape.canvas.outside
-    for at, angle, outlines, color, _ in support_symbols(shape):
+        at, low = shape.at(place), min(y for outline in SUPPORTS[fixed] for _, y in outline)
         ahead = unit * directions(angle) @ PICTURE[len(at)]
-        yield from (Stroke(in_frame(x, at, ahead), color, 0.5, color, 3.5) for x in outlines)
+        for outline in SUPPORTS[fixed]:
+            yield Stroke(in_frame(outline, at, ahead), color, 0.5, color, 3.5)
         if color != ORANGE:
-            low = min(y for outline in outlines for _, y in outline)
             yield from _hatches(in_frame([(-1.0, low), (1.0, low)], at, ahead), unit)
 
 
@@ -328,21 +313,12 @@ def _axes_of_joint(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
         yield Stroke(in_frame(_box(-0.5, 0.5, 0.5, WHITE).points, at, ahead), INK, 1.8, WHITE)
 
 
-class Pin(NamedTuple):
-    """Pin of a joint."""
-
-    at: Array  # (2,) or (3,); m
-    rotates: bool  # True if the joint turns freely
-    places: tuple[AttachmentPoint, ...]  # places that it joins at this point
-
-
-def pins(shape: DeformedShape) -> Iterator[Pin]:
-    """Find the pins of joints; joints that only slide have none."""
+def pins(shape: DeformedShape) -> Iterator[tuple[Array, bool]]:
+    """Yield the pins of joints, and whether they turn freely; joints that only slide have none."""
     for joint in shape.canvas.scene.joints:
         look, rotates = joint_symbol(joint), _rotates(joint)
         for k in look.pins if rotates or look.rail is None else ():
-            places = joint.places[k : k + 1] if look.rod else joint.places[k:]
-            yield Pin(shape.at(joint.places[k]), rotates, places)
+            yield shape.at(joint.places[k]), rotates
 
 
 # -- connectors --------------------------------------------------------------------------------
@@ -547,7 +523,7 @@ def all_symbols(shape: DeformedShape) -> dict[str, list[Stroke]]:
         "centres": [*centres(shape)] if few and not scene.in_space else [],
         "pins": [
             disc(at, unit / 3, INK, WHITE) if rotates else Stroke(at + square, INK, 1.0, INK, PINS)
-            for at, rotates, _ in pins(shape)
+            for at, rotates in pins(shape)
         ],
         "masses": masses(shape),
     }

@@ -26,7 +26,7 @@ from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.extremes import ExtremesInC
-from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter, new_rows
+from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium, turned_far
@@ -408,7 +408,7 @@ class Simulation(Stepper):
             size = columns.width
             if self.solution.needs_start and BEFORE not in columns.at:
                 columns = columns.plus(BEFORE, (self.numbering.size,))
-            (row,) = new_rows(1, columns.width)
+            row = np.zeros(columns.width)
             self._writer.write(row[:size])
             if self.solution.needs_start:
                 columns.column_of(BEFORE, row)[:] = self.subdomain.gather(self.q_before)

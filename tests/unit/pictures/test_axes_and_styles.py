@@ -89,8 +89,8 @@ def labels_of(axis):
         ((1e-3, 10.0), ["0.001", "0.01", "0.1", "1", "10"]),
         ((0.3, 3.0), ["0.5", "1", "2"]),
         ((0.026, 0.056), ["0.03", "0.035", "0.04", "0.045", "0.05", "0.055"]),
-        ((9e-6, 1.1), [f"$10^{{{power}}}$" for power in range(-5, 1)]),
-        ((9e-7, 9e-6), [r"$10^{-6}$", r"$2\cdot10^{-6}$", r"$5\cdot10^{-6}$"]),
+        ((9e-6, 1.1), [rf"$\mathdefault{{10^{{{n}}}}}$" for n in range(-5, 1)]),
+        ((9e-7, 9e-6), [rf"$\mathdefault{{{x}10^{{-6}}}}$" for x in ("", r"2\times", r"5\times")]),
     ],
 )
 def test_labels_of_logarithmic_axes(tmp_path, limits, labels):
