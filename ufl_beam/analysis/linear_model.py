@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, hstack
+from scipy.sparse import block_array, block_diag, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linear_inputs_and_outputs import (
@@ -200,40 +200,26 @@ class LinearModel(Rich):
         if self._reduction is not None:
             A, B, C, D = self.state_space()
             return csr_array(np.eye(len(A))), csr_array(A), csr_array(B), csr_array(C), D
-        small, (P0, P1, P2) = self._small, self._outputs.rows
-        F, moved = self._loads
-        n, nu = small.K.shape[0], self._inputs.number_of_motions
-        y, μ = self._free, self._constraints
-        M, Cd, K, Z = small.M, self._damping, small.K, small._Z
-        S, unity = self._inputs.motions, eye_array(nu)
-        I, none = eye_array(len(y)), None
-
-        def zeros(rows: int, columns: int) -> csr_array:
-            return csr_array((rows, columns))
-
-        E = block_array([
-            [I, none, none, none, none, none],
-            [none, I, none, none, none, none],
-            [zeros(n, len(y)), none, zeros(n, len(y)), zeros(n, len(μ)), none, none],
-            [none, none, none, none, unity, none],
-            [none, none, none, none, none, unity],
-        ])  # fmt: skip
+        small, (P0, P1, P2), (F, moved) = self._small, self._outputs.rows, self._loads
+        y, μ, S, Z = self._free, self._constraints, self._inputs.motions, self._small._Z
+        (n, nf), nu, ny = F.shape, S.shape[1], len(y)
+        I, unity, K = eye_array(ny), eye_array(nu), small.K
+        E = block_diag([I, I, csr_array((n, ny + len(μ))), unity, unity], format="csr")
         A = block_array([
-            [zeros(len(y), len(y)), I, none, none, none, none],
-            [none, zeros(len(y), len(y)), I, none, none, none],
-            [-K[:, y], -Cd[:, y], -M[:, y], -K[:, μ], moved[0], moved[1]],
-            [none, none, none, none, zeros(nu, nu), unity],
-            [none, none, none, none, none, zeros(nu, nu)],
+            [None, I, None, None, None, None],
+            [None, None, I, None, None, None],
+            [-K[:, y], -self._damping[:, y], -small.M[:, y], -K[:, μ], moved[0], moved[1]],
+            [None, None, None, None, None, unity],
         ])  # fmt: skip
-        nf = F.shape[1]
+        A.resize(E.shape)  # the rate of u' is an input
         B = block_array([
-            [zeros(2 * len(y), nf), zeros(2 * len(y), nu)], [F, moved[2]],
-            [zeros(nu, nf), zeros(nu, nu)], [zeros(nu, nf), unity],
-        ])  # fmt: skip
-        C = hstack([P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S])
+            [csr_array((2 * ny, nf)), None], [F, moved[2]], [csr_array((nu, nf)), None],
+            [None, unity],
+        ], format="csr")  # fmt: skip
+        C = block_array([[P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S]])
         order = self._inputs.order
         D = np.hstack([self._outputs.direct, (P2 @ S).toarray()])[:, order]
-        return csr_array(E), csr_array(A), csr_array(csr_array(B)[:, order]), csr_array(C), D
+        return E, csr_array(A), csr_array(B[:, order]), csr_array(C), D
 
     # -- responses -----------------------------------------------------------------------------
 
