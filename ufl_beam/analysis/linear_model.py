@@ -31,7 +31,7 @@ from ufl_beam.analysis.state_space import (
     jumps,
     reduced_motion,
 )
-from ufl_beam.arrays import Array, Complex
+from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.display import Rich, counted
 from ufl_beam.errors import (
@@ -122,24 +122,22 @@ class LinearModel(Rich):
     @cached_property
     def unknowns(self) -> list[tuple[AttachmentPoint | Connector, str]]:
         """Place and component of each unknown."""
-        numbering, small = self._small.numbering, self._small
-        where: dict[int, tuple[Any, str]] = {}
+        numbering, scene = self._small.numbering, self.scene
         names = numbering.names
-        for body, dofs in zip(self.scene.rigid_bodies, numbering.dofs_of_bodies, strict=True):
-            where.update((int(d), (body.middle, c)) for d, c in zip(dofs, names, strict=True))
-        for beam in self.scene.beams:
+        at: list[tuple[Any, Index]] = [
+            (b.middle, numbering.node(b.middle)) for b in scene.rigid_bodies
+        ]
+        for beam in scene.beams:
             s, inner = numbering.parameters(beam), numbering.mesh.nodes[1:-1]
             between = s[:-1, None] + inner * np.diff(s)[:, None]
-            at = np.append(np.column_stack([s[:-1], between]), s[-1])
-            for place, node in zip(at, numbering.nodes_along(beam), strict=True):
-                dofs = zip(numbering.dofs[node], names, strict=True)
-                where.update((int(d), (beam.at(float(place)), c)) for d, c in dofs)
-        for place, node in numbering.beyond.items():
-            dofs = zip(numbering.dofs[node], names, strict=True)
-            where.update((int(d), (place, c)) for d, c in dofs)
-        forces = zip(numbering.multipliers, self.scene.all_connectors, strict=True)
-        where.update((int(d), (connector, "force")) for d, connector in forces)
-        return [where[int(dof)] for dof in small.left]
+            along = np.append(np.column_stack([s[:-1], between]), s[-1])
+            nodes = zip(along, numbering.nodes_along(beam), strict=True)
+            at += [(beam.at(float(place)), numbering.dofs[node]) for place, node in nodes]
+        at += [(place, numbering.dofs[node]) for place, node in numbering.beyond.items()]
+        where = {int(d): (x, c) for x, dofs in at for d, c in zip(dofs, names, strict=True)}
+        connectors = zip(numbering.multipliers, scene.all_connectors, strict=True)
+        where |= {int(d): (connector, "force") for d, connector in connectors}
+        return [where[int(dof)] for dof in self._small.left]
 
     def _unscaled(self, A: csr_array) -> csr_array:
         """Undo the scaling of the rows and columns of constraints."""

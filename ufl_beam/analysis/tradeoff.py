@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -257,19 +258,11 @@ class _Runs:
     begun: float = field(default_factory=time.perf_counter, init=False)  # s
 
     def begin(self, family: int) -> None:
-        """Do a run that compiles, of one step if ``dt`` is a number; then do the coarsest run."""
-        first = Refinement(family, Fraction(1), 0.0)
+        """Let each process compile by a run, of one step if ``dt`` is a number."""
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
-        with alone():
-            try:
-                self._simulate(until, self.setting(first))
-                found = self._compute(first)
-            except ConvergenceError as error:
-                self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
-                return
-        self._store(first, self.comm.bcast(found))
-        self.bar.update(1)
+        with alone(), suppress(ConvergenceError):  # finer steps may converge
+            self._simulate(until, self.families[family])
 
     def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
         """Do the runs that are missing, several at a time if there are several processes.
