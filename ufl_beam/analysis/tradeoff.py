@@ -171,20 +171,17 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
 
     Return the successful search, the other searches, and notes on failed and other searches.
     """
-    searches: list[_Search] = []
-    notes: list[str] = []
-    wrong: list[ArgumentError] = []
-    for k, setting in enumerate(runs.families):
+    searches, notes = list[_Search](), list[str]()
+    failed = list[ArgumentError | TradeoffError]()
+    for k in range(len(runs.families)):
         try:
             runs.begin(k)
             searches.append(_Search(runs, k, target))
-        except ArgumentError as error:
-            wrong.append(error)
-            notes.append(f"{setting}: {error}")
-        except TradeoffError as error:
-            notes.append(f"{setting}: {error}")
-    if len(wrong) == len(runs.families):
-        raise wrong[0]
+        except (ArgumentError, TradeoffError) as error:
+            failed.append(error)
+            notes.append(f"{runs.families[k]}: {error}")
+    if not searches and all(isinstance(error, ArgumentError) for error in failed):
+        raise failed[0]
     searches.sort(key=lambda search: search.objective)
     for n, best in enumerate(searches):
         try:
@@ -192,10 +189,8 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
         except TradeoffError as error:
             notes.append(f"{runs.families[best.family]}: {error}")
             continue
-        notes += [
-            f"{runs.families[search.family]}: given up, another is better in coarse runs"
-            for search in searches[n + 1 :]
-        ]
+        given_up = "given up, another is better in coarse runs"
+        notes += [f"{runs.families[x.family]}: {given_up}" for x in searches[n + 1 :]]
         return best, [search for search in searches if search is not best], notes
     raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
 
