@@ -19,6 +19,7 @@ Example:
     >>> broken = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02)
 """
 
+from importlib import import_module
 from typing import NoReturn
 
 from ufl_beam import dolfinx_compat  # noqa: F401 - first: its errors explain missing packages
@@ -158,20 +159,6 @@ RESULTS = [
 ]  # fmt: skip
 """Classes of results and of places; functions and methods return their instances."""
 
-STRUCTURES = [
-    "ArmstrongFrederick", "AxialBending", "AxialBendingHinge", "Backbone", "BoucWen",
-    "Calibration", "Cycles", "Decay", "DemandCurves", "Envelope", "Fatigue", "Fragility",
-    "Gerber", "Goodman", "Governing", "GroundMotion", "HingeFormation", "HingeTable", "HotSpot",
-    "IbarraKrawinkler", "InteractionDiagram", "KentPark", "LoadCombinations", "Mander",
-    "Measurement", "MenegottoPinto", "MomentCurvature", "PinchingHinge", "Pushover",
-    "RambergOsgood", "ResponseSpectrum", "SNCurve", "Shape", "SpectralResponse", "Storeys",
-    "TargetDisplacement", "calibrate", "damping", "damping_ratio", "fit_decay", "imperfect",
-    "incremental_dynamic_analysis", "interaction_diagram", "load_combinations",
-    "logarithmic_decrement", "moment_curvature", "peaks", "pushover", "rainflow",
-    "response_spectrum", "response_spectrum_analysis",
-]  # fmt: skip
-"""Names that have moved to ``ufl_beam.structures``."""
-
 OLD_NAMES = {
     "Actuator": "PrescribedForce",
     "DecayingMidpoint": "EnergyMomentumDecaying",
@@ -205,17 +192,19 @@ OLD_NAMES = {
     "plot_tradeoff": "plot(tradeoff)",
     "say": "print_once",
 }
-OLD_NAMES |= {name: f"structures.{name}" for name in STRUCTURES}
-OLD_NAMES |= {name: f"extend.{name}" for name in extend.__all__}
-OLD_NAMES |= {name: f"distributions.{name}" for name in distributions.__all__}
-OLD_NAMES |= {
-    name: f"errors.{name}" for name in ("ArgumentTypeError", "ProcessesDiffer", "TradeoffError")
-}
 """Former public names, and the names that replace them."""
 
 
 def __getattr__(name: str) -> NoReturn:
     """Raise :class:`AttributeError`; for an old name, the message has the new name."""
-    new = f"; it is ufl_beam.{OLD_NAMES[name]} now" if name in OLD_NAMES else ""
-    new += "; import ufl_beam.structures first" * (name == "structures")
-    raise AttributeError(f"module 'ufl_beam' has no attribute {name!r}{new}")
+    new = OLD_NAMES.get(name)
+    if not (new or name == "structures" or name.startswith("_")):
+        import_module("ufl_beam.structures")  # becomes a name of this module
+        for module in ("structures", "extend", "distributions", "errors"):
+            found = getattr(globals()[module], name, None)
+            home = getattr(found, "__module__", getattr(found, "__name__", ""))
+            if home.startswith("ufl_beam."):
+                new = f"{module}.{name}"
+    text = f"; it is ufl_beam.{new} now" if new else ""
+    text += "; import ufl_beam.structures first" * (name == "structures")
+    raise AttributeError(f"module 'ufl_beam' has no attribute {name!r}{text}")

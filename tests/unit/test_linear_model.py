@@ -501,6 +501,28 @@ def test_a_motion_without_mass_and_stiffness_is_refused():
             compute()
 
 
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_combination_of_motions_may_have_no_mass(order):
+    """A point mass on a rigid arm of a body without mass, on springs; for each order of bodies."""
+    point = ub.Body((1, 0), mass=5.0, inertia=0.0, name="point")
+    hub = ub.Body((0, 0), mass=0.0, inertia=0.0, name="hub")
+    ground, at = ub.ground(0, 0), hub.middle
+    springs = [ub.Slide(ground, at, ub.Spring(2e3), axis=axis) for axis in ((1, 0), (0, 1))]
+    scene = ub.Scene(
+        [], bodies=[point, hub][::order], joints=[ub.RigidLink(at, point.middle)],
+        connectors=[*springs, ub.Turn(ground, at, ub.Spring(1e3))],
+        loads=[ub.PointLoad(at, force=(1.0, 1.0))],
+    )  # fmt: skip
+    outputs = [("displacement", at), ("velocity", point.middle, "v")]
+    model, s = model_of(scene, scene.loads, outputs), 3j
+    A, B, C, D = model.state_space()
+    assert len(A) == 4
+    by_states = C @ np.linalg.solve(s * np.eye(4) - A, B) + D
+    np.testing.assert_allclose(by_states, model.transfer_function(s)[:, :, 0], rtol=1e-12)
+    by_hand = 1 / (2e3 - 5.0 * 9.0)  # u, by its spring and mass
+    assert by_states[0, 0] == pytest.approx(by_hand, rel=1e-12)
+
+
 def test_state_must_be_an_equilibrium():
     weight = replace(SCENE, loads=[ub.Gravity(), PUSH])
     with raises("unbalanced forces", "v of beam", "not in equilibrium", "at=simulate"):

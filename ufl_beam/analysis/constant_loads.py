@@ -73,7 +73,7 @@ def duration(scene: Scene) -> float:
     return AT if varies else REST
 
 
-def with_amplitude(load: Any, amplitude: TimeFunction) -> Any:
+def with_amplitude(load: Any, amplitude: TimeFunction) -> Load:
     """Return a load with another function of time; a :class:`RotatingFrame` has none.
 
     A :class:`MovingLoad` stays where it is at the time :data:`AT`.
@@ -90,15 +90,12 @@ def grown(load: Load, factor: float = 1.0, *, end: float = 0.0, span: float = RE
 
     The final value is ``factor`` times the value of ``load`` at :data:`AT`.
     """
-    table = Table((end - span, end), (0.0, factor * size_of(load)))
-    grown: Load = with_amplitude(load, table)
-    return grown
+    return with_amplitude(load, Table((end - span, end), (0.0, factor * size_of(load))))
 
 
 def constant(load: Load) -> Load:
     """Return a load that has its value at the time :data:`AT` at all times."""
-    constant: Load = with_amplitude(load, Constant(size_of(load)))
-    return constant
+    return with_amplitude(load, Constant(size_of(load)))
 
 
 def loaded_state(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array, hstack
+from scipy.sparse import block_array, block_diag, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linear_inputs_and_outputs import (
@@ -31,7 +31,7 @@ from ufl_beam.analysis.state_space import (
     jumps,
     reduced_motion,
 )
-from ufl_beam.arrays import Array, Complex
+from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.display import Rich, counted
 from ufl_beam.errors import (
@@ -122,24 +122,22 @@ class LinearModel(Rich):
     @cached_property
     def unknowns(self) -> list[tuple[AttachmentPoint | Connector, str]]:
         """Place and component of each unknown."""
-        numbering, small = self._small.numbering, self._small
-        where: dict[int, tuple[Any, str]] = {}
+        numbering, scene = self._small.numbering, self.scene
         names = numbering.names
-        for body, dofs in zip(self.scene.rigid_bodies, numbering.dofs_of_bodies, strict=True):
-            where.update((int(d), (body.middle, c)) for d, c in zip(dofs, names, strict=True))
-        for beam in self.scene.beams:
+        at: list[tuple[Any, Index]] = [
+            (b.middle, numbering.node(b.middle)) for b in scene.rigid_bodies
+        ]
+        for beam in scene.beams:
             s, inner = numbering.parameters(beam), numbering.mesh.nodes[1:-1]
             between = s[:-1, None] + inner * np.diff(s)[:, None]
-            at = np.append(np.column_stack([s[:-1], between]), s[-1])
-            for place, node in zip(at, numbering.nodes_along(beam), strict=True):
-                dofs = zip(numbering.dofs[node], names, strict=True)
-                where.update((int(d), (beam.at(float(place)), c)) for d, c in dofs)
-        for place, node in numbering.beyond.items():
-            dofs = zip(numbering.dofs[node], names, strict=True)
-            where.update((int(d), (place, c)) for d, c in dofs)
-        forces = zip(numbering.multipliers, self.scene.all_connectors, strict=True)
-        where.update((int(d), (connector, "force")) for d, connector in forces)
-        return [where[int(dof)] for dof in small.left]
+            along = np.append(np.column_stack([s[:-1], between]), s[-1])
+            nodes = zip(along, numbering.nodes_along(beam), strict=True)
+            at += [(beam.at(float(place)), numbering.dofs[node]) for place, node in nodes]
+        at += [(place, numbering.dofs[node]) for place, node in numbering.beyond.items()]
+        where = {int(d): (x, c) for x, dofs in at for d, c in zip(dofs, names, strict=True)}
+        connectors = zip(numbering.multipliers, scene.all_connectors, strict=True)
+        where |= {int(d): (connector, "force") for d, connector in connectors}
+        return [where[int(dof)] for dof in self._small.left]
 
     def _unscaled(self, A: csr_array) -> csr_array:
         """Undo the scaling of the rows and columns of constraints."""
@@ -200,40 +198,26 @@ class LinearModel(Rich):
         if self._reduction is not None:
             A, B, C, D = self.state_space()
             return csr_array(np.eye(len(A))), csr_array(A), csr_array(B), csr_array(C), D
-        small, (P0, P1, P2) = self._small, self._outputs.rows
-        F, moved = self._loads
-        n, nu = small.K.shape[0], self._inputs.number_of_motions
-        y, μ = self._free, self._constraints
-        M, Cd, K, Z = small.M, self._damping, small.K, small._Z
-        S, unity = self._inputs.motions, eye_array(nu)
-        I, none = eye_array(len(y)), None
-
-        def zeros(rows: int, columns: int) -> csr_array:
-            return csr_array((rows, columns))
-
-        E = block_array([
-            [I, none, none, none, none, none],
-            [none, I, none, none, none, none],
-            [zeros(n, len(y)), none, zeros(n, len(y)), zeros(n, len(μ)), none, none],
-            [none, none, none, none, unity, none],
-            [none, none, none, none, none, unity],
-        ])  # fmt: skip
+        small, (P0, P1, P2), (F, moved) = self._small, self._outputs.rows, self._loads
+        y, μ, S, Z = self._free, self._constraints, self._inputs.motions, self._small._Z
+        (n, nf), nu, ny = F.shape, S.shape[1], len(y)
+        I, unity, K = eye_array(ny), eye_array(nu), small.K
+        E = block_diag([I, I, csr_array((n, ny + len(μ))), unity, unity], format="csr")
         A = block_array([
-            [zeros(len(y), len(y)), I, none, none, none, none],
-            [none, zeros(len(y), len(y)), I, none, none, none],
-            [-K[:, y], -Cd[:, y], -M[:, y], -K[:, μ], moved[0], moved[1]],
-            [none, none, none, none, zeros(nu, nu), unity],
-            [none, none, none, none, none, zeros(nu, nu)],
+            [None, I, None, None, None, None],
+            [None, None, I, None, None, None],
+            [-K[:, y], -self._damping[:, y], -small.M[:, y], -K[:, μ], moved[0], moved[1]],
+            [None, None, None, None, None, unity],
         ])  # fmt: skip
-        nf = F.shape[1]
+        A.resize(E.shape)  # the rate of u' is an input
         B = block_array([
-            [zeros(2 * len(y), nf), zeros(2 * len(y), nu)], [F, moved[2]],
-            [zeros(nu, nf), zeros(nu, nu)], [zeros(nu, nf), unity],
-        ])  # fmt: skip
-        C = hstack([P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S])
+            [csr_array((2 * ny, nf)), None], [F, moved[2]], [csr_array((nu, nf)), None],
+            [None, unity],
+        ], format="csr")  # fmt: skip
+        C = block_array([[P0 @ Z[:, y], P1 @ Z[:, y], P2 @ Z[:, y], P0 @ Z[:, μ], P0 @ S, P1 @ S]])
         order = self._inputs.order
         D = np.hstack([self._outputs.direct, (P2 @ S).toarray()])[:, order]
-        return csr_array(E), csr_array(A), csr_array(csr_array(B)[:, order]), csr_array(C), D
+        return E, csr_array(A), csr_array(B[:, order]), csr_array(C), D
 
     # -- responses -----------------------------------------------------------------------------
 

@@ -281,11 +281,7 @@ class Linearization:
 
         They are T x - ω² M x, along the axes of the scene; (num_supports, 3 or 6, n).
         """
-        x, laws = shapes.copy(), self._laws
-        x[laws] = 0.0
-        if len(laws):
-            x[laws] = -(self.tangent[laws] @ x) / self.tangent.diagonal()[laws][:, None]
-        forces = self.tangent @ x - self.masses @ x * omega**2
+        forces = self.condensed_tangent @ shapes - self.masses @ shapes * omega**2
         places = [support.place for support in self.scene.supports]
         nodes = np.reshape([self.numbering.node(x) for x in places], (-1, self.numbering.width))
         found = np.asarray(forces[nodes])

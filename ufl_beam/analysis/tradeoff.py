@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from contextvars import copy_context
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -170,20 +171,17 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
 
     Return the successful search, the other searches, and notes on failed and other searches.
     """
-    searches: list[_Search] = []
-    notes: list[str] = []
-    wrong: list[ArgumentError] = []
-    for k, setting in enumerate(runs.families):
+    searches, notes = list[_Search](), list[str]()
+    failed = list[ArgumentError | TradeoffError]()
+    for k in range(len(runs.families)):
         try:
             runs.begin(k)
             searches.append(_Search(runs, k, target))
-        except ArgumentError as error:
-            wrong.append(error)
-            notes.append(f"{setting}: {error}")
-        except TradeoffError as error:
-            notes.append(f"{setting}: {error}")
-    if len(wrong) == len(runs.families):
-        raise wrong[0]
+        except (ArgumentError, TradeoffError) as error:
+            failed.append(error)
+            notes.append(f"{runs.families[k]}: {error}")
+    if not searches and all(isinstance(error, ArgumentError) for error in failed):
+        raise failed[0]
     searches.sort(key=lambda search: search.objective)
     for n, best in enumerate(searches):
         try:
@@ -191,10 +189,8 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
         except TradeoffError as error:
             notes.append(f"{runs.families[best.family]}: {error}")
             continue
-        notes += [
-            f"{runs.families[search.family]}: given up, another is better in coarse runs"
-            for search in searches[n + 1 :]
-        ]
+        given_up = "given up, another is better in coarse runs"
+        notes += [f"{runs.families[x.family]}: {given_up}" for x in searches[n + 1 :]]
         return best, [search for search in searches if search is not best], notes
     raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
 
@@ -257,19 +253,11 @@ class _Runs:
     begun: float = field(default_factory=time.perf_counter, init=False)  # s
 
     def begin(self, family: int) -> None:
-        """Do a run that compiles, of one step if ``dt`` is a number; then do the coarsest run."""
-        first = Refinement(family, Fraction(1), 0.0)
+        """Let each process compile by a run, of one step if ``dt`` is a number."""
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
-        with alone():
-            try:
-                self._simulate(until, self.setting(first))
-                found = self._compute(first)
-            except ConvergenceError as error:
-                self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
-                return
-        self._store(first, self.comm.bcast(found))
-        self.bar.update(1)
+        with alone(), suppress(ConvergenceError):  # finer steps may converge
+            self._simulate(until, self.families[family])
 
     def run(self, refinements: Sequence[Refinement], *, optional: bool = False) -> None:
         """Do the runs that are missing, several at a time if there are several processes.
