@@ -18,7 +18,9 @@ CLASSES = ["ElastoPlastic", "ElastoPlastic", "RambergOsgood", "ArmstrongFrederic
 
 
 class Draws:
-    """Draws of a writer, from its generator `_random`."""
+    """Draws of a writer, from its generator `_random`; sizes by more decades on each side."""
+
+    _wider = 0.0
 
     def _chance(self, part):
         return self._random.random() < part
@@ -31,7 +33,7 @@ class Draws:
 
     def _size(self, low, high):
         """A size whose decimal logarithm is uniform."""
-        return 10 ** self._some(low, high)
+        return 10 ** self._some(low - self._wider, high + self._wider)
 
     def _one(self, choices):
         return choices[self._integer(0, len(choices) - 1)]

@@ -23,9 +23,9 @@ SPOTS = (0.0, 0.25, 1 / 3, 0.5, 1.0)
 """Where things are attached to beams."""
 
 
-def script(seed, statement=AS_GIVEN):
-    """Python source of a random scene."""
-    return _Writer(seed, statement).source() + "\n"
+def script(seed, statement=AS_GIVEN, wider=0.0):
+    """Python source of a random scene; all sizes are drawn from so many decades more."""
+    return _Writer(seed, statement, wider).source() + "\n"
 
 
 class _Anchor(NamedTuple):
@@ -43,7 +43,8 @@ class _Anchor(NamedTuple):
 class _Writer(Laws):
     """Draws a scene and writes it down."""
 
-    def __init__(self, seed, statement):
+    def __init__(self, seed, statement, wider):
+        self._wider = wider
         self._random = np.random.default_rng(seed)
         self._others = np.random.default_rng([seed, 1])
         self._scattered = self._chance(0.1)

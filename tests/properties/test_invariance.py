@@ -23,26 +23,10 @@ SCHEME = SCHEMES[1]
 each_draw = pytest.mark.parametrize("seed", DRAWS)
 
 
-def in_units(seed):
-    """A statement in random units."""
-    metre, kilogram, second = 10 ** np.random.default_rng(seed).uniform(-4, 4, 3)
-    return Statement(units=(float(kilogram), float(metre), float(second)))
-
-
 def static(seed, *, cut=(), **more):
     """A static run of a scene that cannot move without strain."""
     built = Built(draw(seed, fixed=True), cut=cut)
     return built.run(ub.Static(), steps=5, step=0.1, **more)
-
-
-@each_draw
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_results_do_not_depend_on_units(seed, scheme):
-    """No number in the package has a dimension."""
-    one, other = (Built(draw(seed), x).run(scheme) for x in (AS_GIVEN, in_units(1000 + seed)))
-    assert difference(one, other) < SAME
-    assert one.solution.iterations == other.solution.iterations
-    assert one.solution.substeps == other.solution.substeps
 
 
 @each_draw
@@ -61,20 +45,6 @@ def test_processes_find_the_result_of_one(seed, scheme):
     """The number of processes: against each process alone.  On one rank: a run can be repeated."""
     require_same_on_processes(lambda comm: Built(draw(seed)).run(scheme, comm=comm), SAME)
     assert difference(static(seed), static(seed, comm=MPI.COMM_SELF)) < SAME
-
-
-@each_draw
-def test_adaptive_steps_do_not_depend_on_the_statement(seed):
-    """The steps themselves, by differences of accelerations, which have a few digits less."""
-
-    def run(statement=AS_GIVEN, **more):
-        return Built(draw(seed), statement).run(SCHEME, adaptive=ub.Adaptive(1e-4), **more)
-
-    one, axes = run(), Statement(angle=1.0)
-    for other in (run(in_units(6000 + seed)), run(axes), run(comm=MPI.COMM_SELF)):
-        times = other.solution.times / other.statement.unit("s")
-        np.testing.assert_allclose(times, one.solution.times, rtol=1e-6)
-        assert difference(one, other) < 1e-6
 
 
 @pytest.mark.filterwarnings("ignore:modes. loads have no effect")  # of parts that fall

@@ -2,7 +2,6 @@
 """What is compiled: one quadrature rule per form, and nothing that the scene does not need."""
 
 import math
-import sys
 
 from mpi4py import MPI
 
@@ -13,33 +12,13 @@ from dolfinx import cpp
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.discretization import cell_functions, compiled_forms
+from ufl_beam.discretization import cell_functions
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields, beam_forms
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import VERSION, fem
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
-
-
-@pytest.fixture
-def compiled(monkeypatch):
-    """List that takes every form that is compiled."""
-    for name, module in list(sys.modules.items()):
-        if name.startswith("ufl_beam"):
-            for value in vars(module).values():
-                if hasattr(value, "cache_clear"):
-                    value.cache_clear()
-    found = []
-    compile_form = compiled_forms.fem.form
-    monkeypatch.setattr(compiled_forms, "remembered", lambda _, make: make())
-
-    def note(form, *args, **kwargs):
-        found.append(form)
-        return compile_form(form, *args, **kwargs)
-
-    monkeypatch.setattr(compiled_forms.fem, "form", note)
-    return found
 
 
 def everything():
@@ -50,21 +29,6 @@ def everything():
         loads=[ub.Gravity(), ub.FollowerLoad(beam.end, force=(1, 0)), ub.LineLoad(beam)],
         masses=[ub.PointMass(beam.end, 1.0, 1.0)],
     )
-
-
-@pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1)], ids=str
-)
-def test_forms_have_one_quadrature_rule(compiled, scheme):
-    solution = ub.simulate(everything(), scheme, t=(0, 0.1), dt=0.1)
-    solution.section_forces(solution.scene.beams[0])
-    if scheme.dynamic:
-        solution.momentum()
-    assert len(compiled) >= 2
-    for form in compiled:
-        data = ufl.algorithms.compute_form_data(form)
-        integrals = [i for group in data.integral_data for i in group.integrals]
-        assert len({i.metadata()["quadrature_degree"] for i in integrals}) == 1
 
 
 def plain(**more):
@@ -158,10 +122,3 @@ def test_functions_of_cells_are_what_dolfinx_assembles(mesh):
         on_cells = cell_functions.stiffness_forces, cell_functions.mass_forces
         on_cells[form is mass](fields).add(q, product)
         assert np.abs(product - expected @ q).max() < 1e-13 * np.abs(expected).max()
-
-
-def test_matrix_entries_that_do_not_exist_are_refused():
-    matrix = fields_of_a_frame().matrix()
-    for row, column in ((0, matrix.size - 3), (-1, 0), (matrix.size, 0)):
-        with pytest.raises(ValueError, match="no such entry"):
-            matrix.positions(np.array([row]), np.array([column]))

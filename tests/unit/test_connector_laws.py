@@ -150,44 +150,6 @@ def test_small_steps_keep_the_digits_of_the_force():
     np.testing.assert_allclose(history.force[1:], force[1:], rtol=1e-8)
 
 
-@pytest.mark.parametrize(("name", "scheme"), in_turn(LAWS, SCHEMES), ids=str)
-def test_the_reference_finds_the_same(name, scheme, as_by_reference):
-    _, (connector,), scene = cantilever(LAWS[name])
-    found = run(scene, scheme, dt=0.04, newton=ub.Newton(rtol=1e-12))
-    as_by_reference(found)
-    mine = found.connector(connector)
-    lost = found.energy.lost.get(LAWS[name].entry, 0.0)
-    np.testing.assert_allclose(lost, mine.dissipated, rtol=0, atol=1e-15)
-    if isinstance(scheme, ub.extend.EnergyMomentumBase):
-        assert found.energy.worst < 1e-12
-        if name in ("drag", "maxwell", "damped stop"):
-            assert mine.dissipated[-1] > 0
-            loss = np.diff(mine.dissipated).min()
-            assert loss > -1e-16 or (name, scheme.theta) == ("maxwell", 0.6)
-    if scheme == ub.EnergyMomentumStatic():
-        assert np.diff(found.energy["numerical"]).min() > -1e-16 or name == "bump"
-
-
-@dataclass(frozen=True)
-class Named(Maxwell):
-    """The same, with variables whose names are words that solvers use as well."""
-
-    variables: ClassVar = {"held": 0.0, "dissipated": 1.0, "slip": 1.0, "start": 1.0}
-
-    def energy(self, motion, state):
-        return state.slip * self.k * (motion - state.held) ** 2 / 2
-
-    def increments(self, motion, rate, state, dt):
-        creep = self.k * (motion - state.held) / (self.eta / dt + self.k)
-        return {"held": creep, "dissipated": 0.0, "slip": 0.0, "start": 0.0}
-
-
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum(0.1, 0.1)], ids=str)
-def test_names_of_variables_are_free(scheme, as_by_reference):
-    _, _, scene = cantilever(Named(200.0, 20.0))
-    as_by_reference(run(scene, scheme, newton=ub.Newton(rtol=1e-12)))
-
-
 def test_an_end_of_equilibrium_is_at_rest():
     """With theta = 1 forces are those at the ends of steps: nothing alternates [closed]."""
     for law, scheme, stiffness in [
@@ -220,18 +182,6 @@ def test_a_maxwell_element_relaxes(scheme, order):
         errors.append(math.sqrt(2 * k * solution.energy["stored"][-1]) - force)
         assert solution.connector(connector).dissipated[-1] > 0
     np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.1)
-
-
-def test_motions_of_all_kinds(as_by_reference):
-    """Turn and Stretch: units of the law are N m and rad, or N and m."""
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    turn = ub.Turn(ub.ground(1, 0), beam.end, Cubic(2.0, 30.0))
-    stretch = ub.Stretch(ub.ground(1, 1), beam.end, Drag(50.0, 9.0))
-    push = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda t: math.sin(9 * t))
-    scene = clamped(beam, loads=[push], connectors=[turn, stretch])
-    found = run(scene, ub.EnergyMomentum(), newton=ub.Newton(rtol=1e-12))
-    as_by_reference(found)
-    assert found.energy.worst < 1e-12
 
 
 @dataclass(frozen=True)

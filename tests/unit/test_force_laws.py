@@ -152,11 +152,6 @@ def test_a_history_against_its_closed_form():
     np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 2, atol=0.1)
 
 
-def counting(x, rate, state):
-    """Two internal variables: steps so far, and a sum of motions."""
-    return 1e3 * x, state + np.array([1.0, x])
-
-
 def test_a_law_cannot_change_the_state_that_it_is_given():
     def force(x, rate, state):
         state += 1.0
@@ -165,21 +160,6 @@ def test_a_law_cannot_change_the_state_that_it_is_given():
     _, scene, _ = floating(ub.ForceLaw(force, [0.0]), lambda t: t)
     with pytest.raises(ValueError, match="read-only"):
         run(scene)
-
-
-def hysteretic(x, rate, dt, state):
-    """Bouc and Wen's law with β = γ = 1/2, which is soft from 1 mm on."""
-    z, way = state[0], rate * dt / 1e-3
-    after = (z + way) / (1 + abs(way) * (way * z > 0))
-    return (z + after) / 2, [after]
-
-
-def test_the_reference_path(as_by_reference):
-    beam, scene, springs = floating(ub.ForceLaw(hysteretic, [0.0]))
-    more = ub.Slide(ub.ground(0.5, 0), beam.at(0.5), ub.ForceLaw(counting, [0, 0]), axis=(0, 1))
-    push = ub.PointLoad(beam.at(0.5), force=(0, 4.0), amplitude=lambda t: math.sin(20 * t))
-    scene = replace(scene, loads=(push,), connectors=(*springs, more))
-    as_by_reference(run(scene, ub.EnergyMomentum(), dt=0.01, newton=ub.Newton(rtol=1e-12)))
 
 
 # -- what is refused ---------------------------------------------------------------------------

@@ -210,35 +210,6 @@ def test_velocities_that_contradict_shared_unknowns_are_refused():
 # -- machines and runs in parts --------------------------------------------------------------------
 
 
-def test_the_reference_solver_has_the_same_impacts(as_by_reference):
-    """Several rates that jump at once in a machine with friction, a hinge and offset joints."""
-    crank = ub.Body((0, 0), mass=2.0, inertia=0.5, name="crank")
-    rod = ub.Beam((0.5, 0), (2, 0), SECTION, cells=4, hinges={0.5: ub.ElastoPlastic(40.0, 20.0)})
-    slider = ub.Body((2, 0), mass=1.0, inertia=0.1, name="slider")
-    foot = ub.Body((0, -1), mass=1.0, inertia=0.1, name="foot")
-    angle = ub.PrescribedMotion(ub.Table([0, 0.1, 0.2, 0.3], [0, 0.2, 0.2, 0.5]))
-    moved = ub.Table([0.1, 0.2], [0, 0.1])
-    scene = ub.Scene(
-        [rod], bodies=[crank, slider, foot],
-        supports=[ub.PrescribedDisplacement(foot.middle, u=moved, v=0.0, psi=0.0)],
-        joints=[
-            ub.Revolute(ub.ground(0, 0), crank.middle), ub.Rigid(rod.end, slider.middle),
-            ub.Revolute(crank.at(0.5, 0), rod.start),
-        ],
-        connectors=[
-            ub.Turn(ub.ground(0, 0), crank.middle, angle),
-            ub.Slide(ub.ground(2, 0), slider.middle, ub.Coulomb(3.0), axis=(0, 1)),
-            ub.Stretch(foot.middle, slider.middle, ub.Spring(200.0)),
-        ],
-    )  # fmt: skip
-    run = simulate(scene, ub.EnergyMomentum(0.05), (0, 0.4))
-    lost = run.energy.lost["impacts"]
-    assert lost[0] > 1e-6
-    assert np.flatnonzero(np.diff(lost) > 1e-6).tolist() == [10, 20, 30]
-    assert_balanced(run.energy)
-    as_by_reference(run, 1e-8)
-
-
 def test_a_run_in_parts_does_not_lose_energy():
     """Joints that both scenes have keep the errors of the steps."""
     bob = ub.Body((1, 0), mass=1.0, inertia=0.1)

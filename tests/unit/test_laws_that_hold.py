@@ -121,12 +121,6 @@ def test_held_exactly_and_never_gives_energy(name, scheme):
         assert np.abs(history.force).max() <= largest * (1 + 1e-9)
 
 
-@CASES
-def test_the_reference_finds_the_same(name, scheme, as_by_reference):
-    _, scene = oscillator(LAWS[name])
-    as_by_reference(run(scene, scheme, t=(0, 1), newton=ub.Newton(rtol=1e-12)))
-
-
 @dataclass(frozen=True)
 class Drop(Breakaway):
     """More to break loose than to slide."""

@@ -59,16 +59,21 @@ def machine():
     right = ub.Beam((1, 1.2), (1.3, 0), PLAIN, cells=2, hinges={0.5: ub.Softening(20.0, 5.0)})
     arm = ub.Beam((1, 1.2), (2, 1.2), PLAIN, cells=2)
     block = ub.Body((2.2, 1.2), mass=2.0, inertia=0.1)
+    wheel, axle = ub.Body((3, 2), mass=2.0, inertia=0.1), ub.ground(3, 2)
+    flap = ub.Beam((3, 2), (3.5, 2), PLAIN, cells=2, hinges={0.5: ub.Softening(0.0, 1.0)})
     push = ub.PointLoad(roof.at(1 / 3), force=(900.0, -700.0), amplitude=ub.ramp(0.1))
     return ub.Scene(
-        [left, roof, right, arm],
-        bodies=[block],
+        [left, roof, right, arm, flap],
+        bodies=[block, wheel],
+        connectors=[ub.Turn(axle, wheel.middle, ub.PrescribedMotion(lambda t: np.sin(60 * t)))],
         joints=[
             ub.Rigid(left.end, roof.start),
             ub.Rigid(roof.end, right.start),
             ub.Revolute(roof.end, arm.start),
             ub.Revolute(arm.end, block.at(2.0, 1.2)),
             ub.Link(ub.ground(1.5, 2.5), arm.at(0.5)),
+            ub.Revolute(axle, wheel.middle),
+            ub.Rigid(wheel.middle, flap.start),
         ],
         supports=[
             ub.Clamped(left.start),
