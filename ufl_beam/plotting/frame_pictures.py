@@ -302,7 +302,7 @@ def draw_damage_state(
             placed = [beam.section.fibres for beam in solution.scene.beams]
             cracks = any(f.softening is not None for p in placed if p is not None for f in p.fibres)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
-            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)", 0.1 if in_space else 0.02)
+            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
         if hinges := open_hinges(solution, n, shape.at, limits):
             _draw_hinges(axes, ax, solution, shape, hinges, limits)
         arrange(axes, ax)

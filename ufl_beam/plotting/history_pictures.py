@@ -100,9 +100,7 @@ def draw_shapes(
         last = shapes[-1]
         still = *symbols.rails(last), *symbols.connectors(last), *symbols.supports(last)
         draw_strokes(axes, {"still": still})
-        bar = style.draw_bar(
-            axes, colors, solution.parameter.name, 0.1 if solution.scene.in_space else 0.02
-        )
+        bar = style.draw_bar(axes, colors, solution.parameter.name)
         if solution.parameter.progress != solution.parameter.name:
             bar.formatter = lambda x, _: style.number(np.interp(x, along, instants))
         arrange(axes, ax)

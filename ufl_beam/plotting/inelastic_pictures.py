@@ -18,7 +18,7 @@ from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.connectors import Connector, can_yield, law_of
 from ufl_beam.output.hinge_histories import hinge_histories, require_limits, rotation_of
 from ufl_beam.output.history import breaking_law
-from ufl_beam.output.state_rows import HINGE, JUMP
+from ufl_beam.output.state_rows import HINGE, JUMP, PLASTIC
 from ufl_beam.plotting import style
 from ufl_beam.plotting.positions import DeformedShape, unit_vectors
 from ufl_beam.plotting.style import BLUE, INK, ORANGE, WHITE, Artist, Axes, Figure, shade
@@ -78,15 +78,11 @@ def _law(solution: Solution, where: Place | Connector) -> HingeLaw | None:
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:
     """Compute energies per length dissipated by plastic strains and cracks; (num_cells,); J/m."""
-    numbering = solution.numbering
-    energy = np.zeros(len(numbering.cells))
-    for beam in solution.scene.beams:
-        points = beam.section.section_points(None, solution.scene.in_space)
-        if not all(some.elastic for some in points):
-            state = solution.material(beam, n)
-            cracks = state.hinge if beam.section.fibres is not None else 0.0
-            energy[numbering.cells_of(beam)] = state.plastic + cracks
-    return energy / numbering.lengths(np.arange(len(numbering.cells)))
+    numbering, states = solution.numbering, solution.cells_of(n)
+    cracks = [beam.section.fibres is not None for beam in solution.scene.beams]
+    cracking = np.array(cracks, dtype=bool)[numbering.beam_of_cell]
+    energy = states[:, PLASTIC] + np.where(cracking, states[:, HINGE], 0.0)
+    return np.asarray(energy / numbering.lengths(np.arange(len(states))))
 
 
 def circle(fraction: float, color: Any = BLUE) -> dict[str, Any]:

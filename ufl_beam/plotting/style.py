@@ -258,8 +258,9 @@ def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
     return ScalarMappable(Normalize(low, high), colors)
 
 
-def draw_bar(axes: Axes, colors: Any, label: str, pad: float = 0.02) -> Any:
-    """Draw the colour bar of a :func:`scale`, and return it."""
+def draw_bar(axes: Axes, colors: Any, label: str) -> Any:
+    """Draw the colour bar of a :func:`scale`, beside the numbers of axes in space; return it."""
+    pad = 0.1 if hasattr(axes, "get_zlim") else 0.02
     bar = axes.figure.colorbar(colors, ax=axes, shrink=0.85, aspect=25, pad=pad)
     bar.set_label(label)
     bar.ax.spines["outline"].set_visible(False)

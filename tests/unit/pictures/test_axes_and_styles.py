@@ -9,6 +9,7 @@ from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 
 import ufl_beam as ub
+from ufl_beam.plotting import style
 from ufl_beam.plotting.style import BLUE, INK
 
 PLACED = {"history": 1.0, "moment-curvature": 1.0, "hinge": 0.0}
@@ -102,3 +103,14 @@ def test_labels_of_logarithmic_axes(tmp_path, limits, labels):
     figure.savefig(tmp_path / "log.png")
     assert labels_of(axes.xaxis) == labels
     assert [text.get_text() for text in axes.get_yticklabels()] == ["three", "thirty"]
+
+
+def test_colour_bars_in_space_leave_space_for_numbers():
+    gaps = []
+    for projection in (None, "3d"):
+        with ub.picture((6, 4)) as figure:
+            axes = figure.add_subplot(projection=projection)
+            bar = style.draw_bar(axes, style.scale("viridis", 0.0, 1.0, 0.0, 1.0), "x")
+        figure.draw_without_rendering()
+        gaps.append(bar.ax.get_position().x0 - axes.get_position().x1)
+    assert gaps[1] > gaps[0] + 0.02

@@ -131,6 +131,21 @@ def test_arrows_end_where_they_push_and_begin_where_they_pull(force, end):
     assert np.allclose((nearest - (1.0, 0.0)) @ (-way[1], way[0]), 0.0, atol=1e-12)
 
 
+def test_a_load_on_a_closed_ring_is_drawn_across_it():
+    """Also dead loads: the chord of a ring is round-off and no direction."""
+
+    def circle(s):
+        return math.cos(2 * math.pi * s), math.sin(2 * math.pi * s)
+
+    ring = ub.Beam.along(circle, STEEL, cells=16)
+    joint, load = ub.Rigid(ring.end, ring.start), ub.LineLoad(ring, force=(0, -10.0))
+    figure = ub.plot(clamped(ring, joints=[joint], loads=[load]))
+    (line,) = outlines(figure, "loads", LineCollection, width=1.2)
+    height = line[:, 1] - [circle(s)[1] for s in np.linspace(0, 1, len(line))]
+    np.testing.assert_allclose(height, height[0], rtol=1e-9)
+    assert height[0] > 0
+
+
 def test_hinges_are_at_their_places():
     """Those of a beam, and those of a section in all cells and at the ends."""
     law = ub.Softening(2e4, 1e3)
