@@ -243,3 +243,40 @@ def test_where_friction_is_refused():
         run(scene, ub.Newmark())
     with raises("a path has none"):
         ub.follow(scene, ub.LoadControl(0.2), steps=5)
+
+
+HOLDING = [
+    ub.Coulomb(10.0),
+    ub.RigidPlastic(ub.Softening(10.0, 3.0)),
+    ub.PrescribedMotion(lambda t: 0.0),
+]
+
+
+def held_body(law, axis, *, turns=False):
+    """A body on a joint with this axis, which a law holds against a load that grows."""
+    ground, axis = ub.ground(*np.zeros(len(axis))), np.array(axis) / np.linalg.norm(axis)
+    inertia = 1.3 if len(axis) == 2 else 1.3 * np.eye(3)
+    body = ub.Body(ground.point, mass=1.0, inertia=inertia)
+    joint, connector = (ub.Revolute, ub.Turn) if turns else (ub.Prismatic, ub.Slide)
+    push = np.arange(1.0, len(axis) + 1)
+    load = {"moment": 5 * axis} if turns else {"force": push}
+    drive = connector(ground, body.middle, law, axis=axis)
+    scene = ub.Scene(
+        bodies=[body],
+        joints=[joint(ground, body.middle, axis=axis)],
+        connectors=[drive],
+        loads=[ub.PointLoad(body.middle, amplitude=lambda t: t, **load)],
+    )
+    return scene, drive, 5.0 if turns else push @ axis
+
+
+@pytest.mark.parametrize("turns", [True, False], ids=["turn", "slide"])
+@pytest.mark.parametrize("law", HOLDING, ids=lambda law: type(law).__name__)
+def test_a_body_at_rest_in_space_is_held_without_warning(law, turns):
+    """Its motion is round-off of the forces; no tolerance is relative to that."""
+    for axis in ((-0.443, -0.046, 0.895), (0.3, -0.7, 0.2), (1.0, 2.0, 2.0), (-0.6, 0.1, 0.9)):
+        scene, drive, force = held_body(law, axis, turns=turns)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=2e-3)
+        history = run.connector(drive)
+        assert np.allclose(history.force[1:], force * (run.times[1:] - 1e-3), rtol=0, atol=1e-9)
+        assert np.abs(history.motion).max() < 1e-25  # m, rad

@@ -198,6 +198,9 @@ static int test_convergence(equation *e, const double *x, int iteration)
   if (not_yet || (iteration > 1 && e->demanding)) {
     find_round_off(e, x, e->space);
     floor = 8 * norm_of(e, e->space);
+    /* A motion is round-off if its inertia is round-off of the forces in the scene, as where friction holds all parts. */
+    const double least = DBL_EPSILON * DBL_EPSILON * scale;
+    if (e->product && floor > 0 && floor < least) e->moved = fmin(e->moved * (least / floor), e->scene);
   }
   /* The initial guess may just meet the tolerance without the effect of small loads beside large
    * ones, such as imperfections that make columns buckle. The residual of an iterate is about the
