@@ -280,3 +280,11 @@ def test_a_body_at_rest_in_space_is_held_without_warning(law, turns):
         history = run.connector(drive)
         assert np.allclose(history.force[1:], force * (run.times[1:] - 1e-3), rtol=0, atol=1e-9)
         assert np.abs(history.motion).max() < 1e-25  # m, rad
+
+
+def test_friction_holds_a_slider_on_a_skew_guide_in_statics():
+    """Friction resists no large force, so the stiffness in the first equilibrium decides."""
+    for axis in ((-0.5179661, -0.85540115), (0.9, 0.4), (0.6, 0.8), (-0.1, 1.0)):
+        scene, drive, force = held_body(HOLDING[0], axis)
+        run = ub.simulate(scene, ub.Static(), t=(0, 0.5), dt=0.1)
+        assert np.allclose(run.connector(drive).force[1:], force * run.times[1:])
