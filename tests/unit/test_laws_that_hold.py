@@ -288,3 +288,31 @@ def test_friction_holds_a_slider_on_a_skew_guide_in_statics():
         scene, drive, force = held_body(HOLDING[0], axis)
         run = ub.simulate(scene, ub.Static(), t=(0, 0.5), dt=0.1)
         assert np.allclose(run.connector(drive).force[1:], force * run.times[1:])
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic(theta=0.5)])
+@pytest.mark.parametrize("seed", range(6))
+def test_forces_that_hold_an_arm_of_bodies_in_space(seed, scheme):
+    """Three slides and turns in a row bear the force at the tip; nothing moves or is elastic."""
+    rng = np.random.default_rng(seed)
+    points, before = rng.normal(size=(4, 3)), ub.ground(0, 0, 0)
+    points[0], tip, force = 0.0, points[3], 10 * rng.normal(size=3)
+    bodies, joints, drives, borne = [], [], [], []
+    for k, axis in enumerate(rng.normal(size=(3, 3))):
+        axis /= np.linalg.norm(axis)
+        body = ub.Body((points[k] + points[k + 1]) / 2, mass=1.0, inertia=np.eye(3))
+        ends, turns = (before, body.at(*points[k])), (seed + k) % 3 == 0
+        law = (ub.Coulomb(1e3), HOLDING[2], ub.RigidPlastic(ub.Softening(1e3, 1.0)))[k]
+        joints.append((ub.Revolute if turns else ub.Prismatic)(*ends, axis=axis))
+        drives.append((ub.Turn if turns else ub.Slide)(*ends, law, axis=axis))
+        borne.append(axis @ (np.cross(tip - points[k], force) if turns else force))
+        bodies.append(body)
+        before = body.at(*points[k + 1])
+    load = ub.PointLoad(before, force=force, amplitude=lambda t: t)
+    scene = ub.Scene(bodies=bodies, joints=joints, connectors=drives, loads=[load])
+    run = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.02)
+    middle = 0.01 if scheme != ub.Static() else 0.0  # s, from there to the end of a step
+    for drive, of_load in zip(drives, borne, strict=True):
+        history = run.connector(drive)
+        assert np.allclose(history.force[1:], of_load * (run.times[1:] - middle), atol=1e-9)
+        assert np.abs(history.motion).max() < 1e-20  # m, rad

@@ -382,10 +382,10 @@ SMALL_LOSS = 1e-6  # numerical loss that is never reported, as a fraction of the
 
 
 def work_of_round_off(states: States) -> float:
-    """Return the work of forces of connectors on motions that are round-off of these forces; J."""
+    """Return the largest work of a force of a connector on the round-off of a position; J."""
     scene, forces = states.scene, np.abs(states.q[:, states.numbering.multipliers])
     lengths = [1.0 if x.is_rotation else scene.size for x in scene.all_connectors]
-    return float(np.finfo(float).eps ** 2 * np.max(forces * lengths, initial=0.0))
+    return float(np.finfo(float).eps * np.max(forces * lengths, initial=0.0))
 
 
 class LedgerWatch:
