@@ -237,3 +237,76 @@ def test_where_friction_is_refused():
         run(scene, ub.Newmark())
     with raises("a path has none"):
         ub.follow(scene, ub.LoadControl(0.2), steps=5)
+
+
+HOLDING = [
+    ub.Coulomb(10.0),
+    ub.RigidPlastic(ub.Softening(10.0, 3.0)),
+    ub.PrescribedMotion(lambda t: 0.0),
+]
+
+
+def held_body(law, axis, *, turns=False):
+    """A body on a joint with this axis, which a law holds against a load that grows."""
+    ground, axis = ub.ground(*np.zeros(len(axis))), np.array(axis) / np.linalg.norm(axis)
+    inertia = 1.3 if len(axis) == 2 else 1.3 * np.eye(3)
+    body = ub.Body(ground.point, mass=1.0, inertia=inertia)
+    joint, connector = (ub.Revolute, ub.Turn) if turns else (ub.Prismatic, ub.Slide)
+    push = np.arange(1.0, len(axis) + 1)
+    load = {"moment": 5 * axis} if turns else {"force": push}
+    drive = connector(ground, body.middle, law, axis=axis)
+    scene = ub.Scene(
+        bodies=[body],
+        joints=[joint(ground, body.middle, axis=axis)],
+        connectors=[drive],
+        loads=[ub.PointLoad(body.middle, amplitude=lambda t: t, **load)],
+    )
+    return scene, drive, 5.0 if turns else push @ axis
+
+
+@pytest.mark.parametrize("turns", [True, False], ids=["turn", "slide"])
+@pytest.mark.parametrize("law", HOLDING, ids=lambda law: type(law).__name__)
+def test_a_body_at_rest_in_space_is_held_without_warning(law, turns):
+    """Its motion is round-off of the forces; no tolerance is relative to that."""
+    for axis in ((-0.443, -0.046, 0.895), (0.3, -0.7, 0.2), (1.0, 2.0, 2.0), (-0.6, 0.1, 0.9)):
+        scene, drive, force = held_body(law, axis, turns=turns)
+        run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=2e-3)
+        history = run.connector(drive)
+        assert np.allclose(history.force[1:], force * (run.times[1:] - 1e-3), rtol=0, atol=1e-9)
+        assert np.abs(history.motion).max() < 1e-25  # m, rad
+
+
+def test_friction_holds_a_slider_on_a_skew_guide_in_statics():
+    """Friction resists no large force, so the stiffness in the first equilibrium decides."""
+    for axis in ((-0.5179661, -0.85540115), (0.9, 0.4), (0.6, 0.8), (-0.1, 1.0)):
+        scene, drive, force = held_body(HOLDING[0], axis)
+        run = ub.simulate(scene, ub.Static(), t=(0, 0.5), dt=0.1)
+        assert np.allclose(run.connector(drive).force[1:], force * run.times[1:])
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic(theta=0.5)])
+@pytest.mark.parametrize("seed", range(6))
+def test_forces_that_hold_an_arm_of_bodies_in_space(seed, scheme):
+    """Three slides and turns in a row bear the force at the tip; nothing moves or is elastic."""
+    rng = np.random.default_rng(seed)
+    points, before = rng.normal(size=(4, 3)), ub.ground(0, 0, 0)
+    points[0], tip, force = 0.0, points[3], 10 * rng.normal(size=3)
+    bodies, joints, drives, borne = [], [], [], []
+    for k, axis in enumerate(rng.normal(size=(3, 3))):
+        axis /= np.linalg.norm(axis)
+        body = ub.Body((points[k] + points[k + 1]) / 2, mass=1.0, inertia=np.eye(3))
+        ends, turns = (before, body.at(*points[k])), (seed + k) % 3 == 0
+        law = (ub.Coulomb(1e3), HOLDING[2], ub.RigidPlastic(ub.Softening(1e3, 1.0)))[k]
+        joints.append((ub.Revolute if turns else ub.Prismatic)(*ends, axis=axis))
+        drives.append((ub.Turn if turns else ub.Slide)(*ends, law, axis=axis))
+        borne.append(axis @ (np.cross(tip - points[k], force) if turns else force))
+        bodies.append(body)
+        before = body.at(*points[k + 1])
+    load = ub.PointLoad(before, force=force, amplitude=lambda t: t)
+    scene = ub.Scene(bodies=bodies, joints=joints, connectors=drives, loads=[load])
+    run = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.02)
+    middle = 0.01 if scheme != ub.Static() else 0.0  # s, from there to the end of a step
+    for drive, of_load in zip(drives, borne, strict=True):
+        history = run.connector(drive)
+        assert np.allclose(history.force[1:], of_load * (run.times[1:] - middle), atol=1e-9)
+        assert np.abs(history.motion).max() < 1e-20  # m, rad

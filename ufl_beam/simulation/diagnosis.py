@@ -401,6 +401,13 @@ A motion that the steps resolve loses a small fraction of its energy in each ste
 SMALL_LOSS = 1e-6  # numerical loss that is never reported, as a fraction of the energy transferred
 
 
+def work_of_round_off(states: States) -> float:
+    """Return the largest work of a force of a connector on the round-off of a position; J."""
+    scene, forces = states.scene, np.abs(states.q[:, states.numbering.multipliers])
+    lengths = [1.0 if x.is_rotation else scene.size for x in scene.all_connectors]
+    return float(np.finfo(float).eps * np.max(forces * lengths, initial=0.0))
+
+
 class LedgerWatch:
     """Check of the energy ledger of a run; each stored state is checked once.
 
@@ -465,7 +472,7 @@ class LedgerWatch:
             if name in lost and name not in self._told:
                 falls = -np.diff(lost[name])
                 n = int(np.argmax(falls))
-                if falls[n] > allowed:
+                if falls[n] > allowed and falls[n] > work_of_round_off(states):
                     self._told.add(name)
                     before, after = times[n : n + 2]
                     yield (

@@ -136,6 +136,8 @@ fraction of (size of the forces) · (size of the scene); N m.  The motion is mea
 and the stiffness as a moment per angle.  The stiffness by a weight or a tension is typically some
 tenths of this product."""
 
+HELD = 0.01  # least change of a constraint by a motion that it holds, by its largest change
+
 SHORT_SUBSTEP = 512
 """A substep of at most 1/512 of the time in which loads are applied may exceed APPLYING_ROTATION.
 If nodes rotate that far in so short a time, the scene jumps, and shorter substeps do not help."""
@@ -356,8 +358,11 @@ class Stepper(StateView):
             K, free, _, vectors = found
             x, scales = vectors[:, -1], self.numbering.scales[free]
             motion = np.abs(x * scales).max()
-            forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
-            if forces <= FREE_STIFFNESS * newton.scale() * self.scene.size * motion:
+            left, moves = K @ x, scales > 0
+            forces = np.linalg.norm(left[moves] / scales[moves])
+            most = abs(K)[:, moves] @ (motion / scales[moves])
+            held = np.any((np.abs(left) > HELD * most)[~moves])  # as by friction that sticks
+            if not held and forces <= FREE_STIFFNESS * newton.scale() * self.scene.size * motion:
                 if self.may_be_free:
                     return
                 said = describe_motions(self.scene, self._of_members(vectors, free))

@@ -437,14 +437,14 @@ void add_energy_of_block(void *self, const time_step *step, const double *q1, co
 }
 
 /* Largest residual of a law. Residuals of motions are divided by 1 % of `moved`, which is at most the size of the
- * scene; residuals of forces are divided by `scale`. Round-off of the motions does not count; it grows with the
- * distance from the initial position and with the number of turns.
+ * scene, or of `quiet` if that is larger; residuals of forces are divided by `scale`. Round-off of the motions does not
+ * count; it grows with the distance from the initial position and with the number of turns.
  *
  * A law with internal variables computes its force from the elastic part of a motion, which has the round-off of the
  * motions at both ends of the step. Times the elastic stiffness it is all that remains of the force of a spring that
  * has failed, where the slope of the law and `scale` vanish. The law and the unknown force, which is the law of an
  * earlier iterate, err by half a digit each. */
-double missed_by_block(void *self, const double *q, const double *r, double scale, double moved)
+double missed_by_block(void *self, const double *q, const double *r, double scale, double moved, double quiet)
 {
   const element_block *b = self;
   const int n = b->lanes, k = b->laws, motions = b->unknowns - k;
@@ -459,7 +459,7 @@ double missed_by_block(void *self, const double *q, const double *r, double scal
         far = fmax(far, amplitude + fabs(q[dofs[i * n]]) / (3 * i < 2 * motions ? b->scene : 1));
       for (int j = 0; j < k; ++j, slope += (k + 2) * n) {
         const double force = fabs(slope[n]) * scale * b->scene / b->length[j];
-        const double size = *slope ? 0.01 * b->length[j] * amplitude : force;
+        const double size = *slope ? 0.01 * b->length[j] * fmax(amplitude, quiet / b->scene) : force;
         double reach = 0; /* of the motions in the law */
         for (int i = 0; i < k; ++i) reach += fabs(slope[(i + 2) * n]) * b->length[i];
         double round_off = 8 * reach * last_digit(far);

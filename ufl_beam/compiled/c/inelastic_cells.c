@@ -146,7 +146,7 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
 
 /* Largest difference at q between the force of a point and the force of its strain, relative to
  * `scale`. */
-double missed_by_points(void *self, const double *q, const double *r, double scale, double moved)
+double missed_by_points(void *self, const double *q, const double *r, double scale, double moved, double quiet)
 {
   const inelastic *m = self;
   const double *unlike = m->points->unlike;

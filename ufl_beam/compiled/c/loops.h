@@ -377,8 +377,8 @@ enum { INSERT_VALUES = 1, ADD_VALUES = 2, FORWARD = 0, REVERSE = 1 }; /* of Inse
 enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by this error */
 
 /* Relative violation of a law at an iterate q with the residual r. scale is the size of the forces;
- * moved is the largest motion, see find_motion. */
-typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
+ * moved is the largest motion, see find_motion; motions up to quiet are round-off. */
+typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved, double quiet);
 typedef struct { miss *missed; void *self; } law_residual;
 miss missed_by_points, missed_by_block;
 

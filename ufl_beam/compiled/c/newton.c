@@ -145,15 +145,16 @@ static const double CLOSE = 8;
 /* Factor by which a residual should fall below the tolerance in iterations that keep the tangent. */
 static const double MARGIN = 1000;
 
-/* Whether x and its residual satisfy the laws of connectors and points on all processes. */
-static int laws_met(const equation *e, const double *x, double scale)
+/* Whether x and its residual satisfy the laws of connectors and points on all processes; motions up to `quiet` are
+ * round-off. */
+static int laws_met(const equation *e, const double *x, double scale, double quiet)
 {
   if (!e->demanding) return 1;
   const double *q = in_plane(e, x);
   double most = 0;
   for (int k = 0; k < e->law_residuals; ++k) {
     const law_residual *law = e->law_residual + k;
-    most = fmax(most, law->missed(law->self, q, e->residual, scale, e->moved));
+    most = fmax(most, law->missed(law->self, q, e->residual, scale, e->moved, quiet));
   }
   return over_processes(e, LARGEST, most) <= e->rtol;
 }
@@ -194,16 +195,21 @@ static int test_convergence(equation *e, const double *x, int iteration)
   const double wanted = e->rtol * scale;
   const int not_yet = iteration > 1 && residual > wanted;
   double floor = 0; /* several times the residual caused by the round-off of the unknowns */
+  double quiet = 0; /* a motion up to this size is round-off */
   if (not_yet || e->demanding) find_motion(e, x);
   if (not_yet || (iteration > 1 && e->demanding)) {
     find_round_off(e, x, e->space);
     floor = 8 * norm_of(e, e->space);
+    /* A motion is round-off if its forces are round-off of the forces in the scene, as where friction holds all parts. */
+    const double least = DBL_EPSILON * DBL_EPSILON * scale;
+    if (floor == 0) quiet = DBL_EPSILON * DBL_EPSILON * e->scene;
+    else if (floor < least) quiet = fmin(fmax(e->moved, DBL_MIN) * (least / floor), e->scene);
   }
   /* The initial guess may just meet the tolerance without the effect of small loads beside large
    * ones, such as imperfections that make columns buckle. The residual of an iterate is about the
    * square of the previous one. */
   const double enough = iteration < e->least ? SURE * wanted : wanted;
-  const int met = residual > wanted || laws_met(e, x, scale), kept = e->near;
+  const int met = residual > wanted || laws_met(e, x, scale, quiet), kept = e->near;
   if (residual <= enough && met && kept < 2) return CONVERGED;
   const int close = residual <= CLOSE * wanted && !e->demanding;
   if (iteration > 1 && kept < 2) {
@@ -212,7 +218,7 @@ static int test_convergence(equation *e, const double *x, int iteration)
      * such states for ever. With a kept tangent that is no proof, but it suffices close to the
      * tolerance. */
     const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
-    if ((stays || residual <= floor / 80) && laws_met(e, x, scale)) return AT_ROUND_OFF;
+    if ((stays || residual <= floor / 80) && laws_met(e, x, scale, quiet)) return AT_ROUND_OFF;
   }
   e->near = kept == 2;
   if (iteration > !e->product && !kept && !e->rotations && (close || residual > floor)) {
