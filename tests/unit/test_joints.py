@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 from helpers import raises, run
-from scenes import clamped, rigid_chain
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import DofNumbering
@@ -226,19 +226,6 @@ def test_statics_names_what_is_free():
     for scene in (hung, replace(hung, connectors=turns[1:])):
         with raises("loose (body 0) can turn about (1, 0)"):
             at_rest(scene)
-
-
-def test_free_motions_of_many_beams():
-    """Above 30 beams the matrix of the constraints is sparse."""
-    for n in (30, 31):
-        rods = [beam((i, 0), (i + 1, 0), name=f"rod {i}") for i in range(n)]
-        pinned = rigid_chain(rods, supports=[ub.Pinned(rods[0].start)])
-        said = "in 1 way", "rod 0 (beam 0) can turn about (0, 0)", f"and {n - 4} more"
-        with raises(*said):
-            at_rest(pinned)
-        ub.Simulation(replace(pinned, supports=[ub.Clamped(rods[0].start)]), ub.Static()).close()
-        with raises(f"in {3 * n if n == 30 else 'at least 6'} independent ways"):
-            at_rest(ub.Scene(rods))
 
 
 def test_derivatives_of_undeformed_motions():

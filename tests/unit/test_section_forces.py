@@ -117,14 +117,6 @@ def test_ends_of_beams_bear_what_supports_and_joints_do(actions, scheme):
 
 
 @pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.EnergyMomentum(), ub.EnergyMomentumDecaying()], ids=str
-)
-def test_as_in_the_reference_path(scheme, as_by_reference):
-    scene, _ = two_beams("virtual work", "yielding")
-    as_by_reference(run(scene, scheme, t=(0, 0.1), dt=0.02), 1e-7)
-
-
-@pytest.mark.parametrize(
     "scheme", [ub.EnergyMomentum(), ub.EnergyMomentumStatic(theta=0.5)], ids=str
 )
 def test_steps_that_are_not_kept_change_nothing(scheme):

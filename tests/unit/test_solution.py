@@ -115,12 +115,6 @@ def test_reactions_are_of_the_kind_of_the_support():
     assert np.abs(turn[:, 2]).min() > 1e-2
 
 
-def test_a_support_of_no_scene_has_no_reaction():
-    scene, beam = cantilever()
-    with raises("reaction: Clamped at beam.end", "is not in the scene"):
-        static(scene, 1).reaction(ub.Clamped(beam.end))
-
-
 def test_reaction_drives_the_momentum():
     """In dynamics a reaction acts during the step that ends at its time."""
     scene, _ = cantilever(

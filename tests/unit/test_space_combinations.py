@@ -72,15 +72,14 @@ def test_free_motions_beside_damping():
 
 
 @pytest.mark.serial
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
 @pytest.mark.parametrize("kind", ["laws", "fibres"])
-def test_reference_solver_with_inelastic_beams(kind, scheme):
+def test_reference_solver_with_inelastic_beams(kind):
     made, size = ub.Section(**STIFF, **OTHER, **SIX), 1.0
     if kind == "fibres":
         made, size = square(4, 0.1, ub.ElastoPlastic(355e6, isotropic=5e9)), 4e4
     scene = cantilever(made, skew, amplitude=lambda t: 20 * t, size=size)
     ordinary, plain = (
-        ub.simulate(scene, scheme, t=(0, 0.1), dt=0.005, newton=newton)
+        ub.simulate(scene, ub.Static(), t=(0, 0.1), dt=0.005, newton=newton)
         for newton in (EXACT, ub.Newton(rtol=1e-12, reference=True))
     )
     end = scene.beams[0].end
@@ -89,25 +88,6 @@ def test_reference_solver_with_inelastic_beams(kind, scheme):
     lost = [run.energy["plastic"][-1] for run in (ordinary, plain)]
     assert lost[0] > 0
     assert np.isclose(*lost, rtol=1e-9)
-
-
-@pytest.mark.serial
-def test_reference_solver_with_friction_by_the_force_of_a_joint():
-    """The limit of a step has the force of the step before, in both solvers."""
-    ball, foot = ub.Body((0, 0, 0), mass=2.0, inertia=(1, 1, 1)), ub.ground(0, 0, 0)
-    rail = ub.Prismatic(foot, ball.middle, axis=(1, 0, 0))
-    rubbing = ub.Slide(foot, ball.middle, ub.Coulomb(coefficient=0.1, joint=rail), axis=(1, 0, 0))
-    scene = ub.Scene(
-        bodies=[ball], joints=[rail], connectors=[rubbing], loads=[ub.Gravity((0, 0, -9.81))],
-        initial=[ub.Velocity([ball], linear=(3, 0, 0), angular=(0, 0, 0), about=(0, 0, 0))],
-    )  # fmt: skip
-    forces = [
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.05, newton=newton)
-        .connector(rubbing).force
-        for newton in (EXACT, ub.Newton(rtol=1e-12, reference=True))
-    ]  # fmt: skip
-    assert np.abs(np.abs(forces[0][2:]) - 0.1 * 2.0 * 9.81).max() < 1e-12
-    assert np.abs(forces[0] - forces[1]).max() < 1e-12
 
 
 def test_viscosity_may_begin_with_start():

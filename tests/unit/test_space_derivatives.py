@@ -12,10 +12,6 @@ from test_space import OTHER, PLANAR, STIFF
 from test_space_analysis import bent_arm
 
 import ufl_beam as ub
-from ufl_beam.blocks.beams import alike
-from ufl_beam.blocks.block import called
-from ufl_beam.blocks.spatial_beams import ElasticCellInSpace
-from ufl_beam.blocks.statement import kernels
 
 
 def growing(t):
@@ -24,30 +20,6 @@ def growing(t):
 
 def swinging(t):
     return np.sin(4 * t)
-
-
-# -- the table of derivatives ----------------------------------------------------------------------
-
-
-def test_the_table_of_a_cell_equals_differences():
-    """All rows but those of the tangent, which are zero, by central differences."""
-    made, made_of = kernels(statement := ElasticCellInSpace(alike(ub.EnergyMomentum()))), []
-    (table, margins), n = made.derivative, len(statement.inputs)
-    assert not margins
-    w = np.random.default_rng(0).uniform(0.1, 0.4, n)
-    h, last = 1e-4, len(statement.unknowns)
-    for change in h * np.eye(n):
-        values = [
-            np.append(
-                called(made.force, w + k * change)[:last], called(made.end, w + k * change)[:8]
-            )
-            for k in (-2, -1, 1, 2)
-        ]
-        made_of.append((8 * (values[2] - values[1]) - (values[3] - values[0])) / (12 * h))
-    exact, found = np.transpose(made_of), called(table, w).reshape(-1, n)
-    assert not found[:last, :last].any()
-    exact[:last, :last] = 0.0
-    assert np.abs(found - exact).max() < 1e-8 * np.abs(exact).max()
 
 
 # -- derivatives of runs ---------------------------------------------------------------------------

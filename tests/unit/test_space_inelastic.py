@@ -168,7 +168,6 @@ SIX = {
     "bending2": ub.ElastoPlastic(6.0, kinematic=30.0),
     "bending": ub.ElastoPlastic(8.0, isotropic=20.0),
 }
-YIELDING = ub.Section(**STIFF, **OTHER, **SIX)
 RANDOM = Rotation.from_rotvec([-1.1, 0.4, 0.9])
 
 
@@ -224,41 +223,6 @@ def test_turned_scene_with_six_laws():
         forces = [run.section_forces(x) for run, x in ((one, a), (other, b))]
         assert np.abs(forces[0] - forces[1]).max() < 1e-11 * np.abs(forces[0]).max()
     assert np.isclose(*(x.energy["plastic"][-1] for x in (one, other)), rtol=1e-12)
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], ids=str)
-def test_start_changes_no_bit(scheme):
-    scene = cantilever(YIELDING, skew, amplitude=push)
-    whole, first = (ub.simulate(scene, scheme, t=(0, t), dt=1 / 64) for t in (1, 0.5))
-    second = ub.simulate(scene, scheme, t=(0.5, 1), dt=1 / 64, start=first)
-    for beam in scene.beams:
-        assert (whole.displacement(beam.end)[-1] == second.displacement(beam.end)[-1]).all()
-        for field in ("forces", "plastic"):
-            pair = (getattr(run.material(beam), field) for run in (whole, second))
-            assert np.array_equal(*pair)
-    assert np.isclose(
-        whole.energy["plastic"][-1], first.energy["plastic"][-1] + second.energy["plastic"][-1]
-    )
-
-
-@pytest.mark.serial  # sums over processes differ in last bits
-@IN_LONG_CELLS
-@pytest.mark.parametrize("scene", ["hinges", "laws"])
-def test_restart_changes_no_bit(tmp_path, scene):
-    """A run that continues from the checkpoint of a shorter one, and a run without a pause."""
-    made = two_hinges() if scene == "hinges" else flight(RANDOM, **SIX)
-
-    def run(end, **more):
-        return ub.simulate(made, ub.EnergyMomentum(), t=(0, end), dt=1 / 64, **more)
-
-    saved = ub.Checkpoint(tmp_path / "state", every=16)
-    run(0.5, checkpoint=saved)
-    one, other = run(1.0), run(1.0, checkpoint=saved)
-    assert np.array_equal(one.q[-1], other.q[-1])
-    for beam in made.beams:
-        assert np.array_equal(one.displacement(beam.end)[-1], other.displacement(beam.end)[-1])
-    for name in one.energy:
-        assert one.energy[name][-1] == other.energy[name][-1], name
 
 
 # -- hinges --------------------------------------------------------------------------------------
@@ -333,47 +297,6 @@ def test_moment_of_a_hinge_equals_its_law_to_330_degrees(kind):
     assert np.allclose(run.section_forces(beam)[0, 5], moment[-1], rtol=1e-7)
     area = 8.0 * np.abs(jump[-1]) - 8.0**2 / (4 * 60.0) * jump[-1] ** 2  # of the law, to the jump
     assert np.isclose(run.energy["hinges"][-1], area, rtol=1e-8)
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
-@pytest.mark.parametrize(
-    "law",
-    [
-        ub.Spring(0.1), ub.Coulomb(0.1), ub.PrescribedMotion(lambda t: 2 * t),
-        ub.RigidPlastic(ub.LinearSoftening(0.5, fracture_energy=10.0)),
-    ],
-    ids=lambda law: type(law).__name__,
-)  # fmt: skip
-def test_a_connector_of_a_revolute_joint_turns_as_often_as_in_the_plane(law, scheme):
-    """A body on a skew axis, up to eleven turns; a run in two parts is the same."""
-    static = isinstance(scheme, ub.Static)
-    if static and not isinstance(law, (ub.Spring, ub.PrescribedMotion)):
-        pytest.skip("a mechanism")
-    axis, found = (1.0, 2.0, 2.0), []
-    for at, turn in (((0, 0), {}), ((0, 0, 0), {"axis": axis})):
-        body = ub.Body(at, mass=1.0, inertia=(1.0, 1.0, 1.0) if turn else 1.0)
-        places = ub.ground(*at), body.middle
-        moment = tuple(np.array(axis) / 3) if turn else 1.0
-        push = ub.PointLoad(body.middle, moment=moment, amplitude=lambda t: t / 6)
-        motor = ub.Turn(*places, law, **turn)
-        scene = ub.Scene(
-            [], bodies=[body], joints=[ub.Revolute(*places, **turn)], connectors=[motor],
-            loads=[push],
-        )  # fmt: skip
-        arguments = {"dt": 0.1, "newton": EXACT, "progress": False}
-        run = ub.simulate(scene, scheme, t=(0, 12), **arguments)
-        found.append(run.connector(motor))
-        if not static:
-            half = ub.simulate(scene, scheme, t=(0, 6), **arguments)
-            rest = ub.simulate(scene, scheme, t=(6, 12), start=half, **arguments)
-            assert np.isclose(rest.connector(motor).motion[-1], found[-1].motion[-1], rtol=1e-9)
-            if turn:
-                with pytest.raises(ub.ArgumentError, match=r"Turn.* has internal variables"):
-                    ub.simulate(scene, scheme, t=(11, 12), start=(run, 110), **arguments)
-    plane, space = found
-    assert np.abs(plane.motion).max() > 3 * np.pi
-    assert np.allclose(space.motion, plane.motion, rtol=1e-9, atol=1e-9)
-    assert np.allclose(space.force, plane.force, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.serial
@@ -519,11 +442,6 @@ def test_fibres_of_large_limits_are_elastic():
 
 def test_refused_by_name():
     points = (0, 0, 0), (1, 0, 0)
-    layered = ub.Section.rectangle(
-        b=0.1, h=0.2, E=210e9, nu=0.3, fibres=ub.Fibres(ub.ElastoPlastic(355e6), number=4)
-    )
-    with pytest.raises(ub.ModelError, match=r"girder: the fibres of its section have no z"):
-        ub.Scene([ub.Beam(*points, layered, name="girder")])
     coupled = ub.Section(**STIFF, **OTHER, interaction=st.AxialBending(10.0, 8.0))
     with pytest.raises(ub.ModelError, match="girder: interaction of N and M is for scenes in the"):
         ub.Scene([ub.Beam(*points, coupled, name="girder")])
@@ -544,15 +462,6 @@ def test_parts_that_yield_in_space_only():
     for name, law in SIX.items():
         beam = ub.Beam((0, 0, 0), (1, 0, 0), ub.Section(**STIFF, **OTHER, **{name: law}))
         assert [part for part, _ in parts_that_switch(ub.Scene([beam]))] == [beam.name], name
-
-
-def test_start_from_a_state_in_between():
-    """Elastic beams have no internal variables: the rotations of the nodes suffice."""
-    scene = cantilever(ub.Section(**STIFF, **OTHER), skew, amplitude=push)
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02)
-    again = ub.simulate(scene, ub.EnergyMomentum(), t=(0.04, 0.1), dt=0.02, start=(run, 2))
-    tips = [x.displacement(x.scene.beams[0].end)[-1] for x in (run, again)]
-    assert np.abs(tips[0] - tips[1]).max() < 1e-10 * np.abs(tips[0]).max()
 
 
 @pytest.mark.serial

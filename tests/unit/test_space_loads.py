@@ -283,47 +283,6 @@ def test_a_load_that_is_added_follows_the_rotation():
     assert np.abs(second - whole).max() < 1e-9
 
 
-def machine():
-    """A driven beam with a spinning wheel, follower loads, and pressures in both directions."""
-    root = ub.Beam((0, 0, 0), (0, 0, 2), SECTION, cells=3, up=(1, 0, 0))
-    arm = ub.Beam((0, 0, 2), (2, 0.5, 2), SECTION, cells=3)
-    wheel = ub.Body((2, 0.5, 2), mass=3.0, inertia=(0.4, 0.7, 0.4))
-    foot = ub.PrescribedDisplacement(
-        root.start, u=lambda t: 0.1 * np.sin(3 * t), v=0.0, w=0.0, along=(1, 2, 2),
-        axis=(1, 0, 3), psi=lambda t: 2 * t * t,
-    )  # fmt: skip
-    loads = [
-        ub.FollowerLoad(arm.end, force=(3, 8, -2), moment=(1, 5, 2), amplitude=lambda t: 1 + t),
-        ub.Pressure(root, normal=(8.0, -5.0), tangential=3.0, profile=(0.2, 1.5)),
-        ub.Pressure(arm, normal=(-2.0, 9.0), span=(0.5, 1.0), amplitude=np.sin),
-        ub.PointLoad(wheel.at(2.5, 0.5, 2), force=(5, 0, 9), moment=(0, 2, 0)),
-        ub.Gravity((0, 0, -9.81)),
-    ]
-    return ub.Scene(
-        [root, arm], bodies=[wheel], supports=[foot], loads=loads,
-        joints=[
-            ub.Rigid(root.end, arm.start), ub.Revolute(arm.end, wheel.middle, axis=(0, 1, 0)),
-        ],
-        initial=[ub.Velocity([wheel], angular=(0, 9, 0), linear=(0, 0, 0), about=(2, 0.5, 2))],
-    )  # fmt: skip
-
-
-@pytest.mark.filterwarnings("ignore:Velocity")
-def test_a_machine_balances_and_restarts(shared_path):
-    """The ledger closes; a restart from a checkpoint changes no bit, and start= only digits."""
-
-    def run(end, begin=0.0, **more):
-        return ub.simulate(scene, ub.EnergyMomentum(), t=(begin, end), dt=1 / 32, **more)
-
-    scene, checkpoint = machine(), ub.Checkpoint(shared_path / "run.checkpoint", every=8)
-    wheel = scene.bodies[0].middle
-    whole, first = run(2), run(1, checkpoint=checkpoint)
-    assert whole.energy.worst < 1e-11
-    assert (run(2, checkpoint=checkpoint).displacement(wheel) == whole.displacement(wheel)).all()
-    second = run(2, 1.0, start=first)
-    assert np.abs(second.displacement(wheel) - whole.displacement(wheel)[32:]).max() < 1e-10
-
-
 def test_a_flight_seen_from_a_rotating_frame():
     """A bent beam with a spinning wheel, in a frame that turns: the errors are of second order.
 

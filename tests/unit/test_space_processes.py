@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""One scene in space on several processes: the results are those of one process."""
+"""One scene in space on several processes: the results are those of one process.
+
+Random scenes are in properties/test_random_scenes_in_space.py: all schemes, other laws.
+"""
 
 import dataclasses
 import math
@@ -127,15 +130,12 @@ def test_bodies_that_share_a_part_of_their_unknowns(joint):
 
 
 LAWS = {
-    "spring": ub.Spring(40.0), "damper": ub.Damper(3.0),
-    "yielding": ub.Spring(90.0, ub.ElastoPlastic(2.0)),
-    "stop": ub.Stop(200.0, low=-0.02, high=0.02), "friction": ub.Coulomb(0.3),
-    "motor": ub.PrescribedMotion(lambda t: 0.2 * t * t),
-    "force": ub.PrescribedForce(lambda t: 5 * t),
     "hinge": ub.RigidPlastic(ub.LinearSoftening(0.5, fracture_energy=0.2)),
     "force law": ub.ForceLaw(lambda motion, rate: 20 * motion + 3 * rate),
     "controller": ub.Controller(lambda now: -5 * now.displacement(now.scene.beams[1].end)[2]),
-}  # fmt: skip
+}
+"""Laws that random scenes do not have."""
+
 CONNECTORS = {
     "Stretch": lambda a, b, law: ub.Stretch(a, b, law),
     "Slide": lambda a, b, law: ub.Slide(a, b, law, axis=AXIS),
@@ -152,7 +152,7 @@ def test_connectors_across_a_border(kind, law):
 
     def join(a, b, wheel):
         both = [CONNECTORS[kind](a, b, LAWS[law])]
-        if law not in ("hinge", "motor"):
+        if law != "hinge":
             both.append(CONNECTORS[kind](a.beam.at(1 / 3), wheel.middle, LAWS[law]))
         joints = [ub.Spherical(b, wheel.at(*b.point))]
         return [*joints, *([joint(a, b)] if joint else [])], both
@@ -160,23 +160,6 @@ def test_connectors_across_a_border(kind, law):
     if law == "hinge" and kind != "Turn":
         pytest.skip("hinges turn")
     check(chain(join, apart=0.3 * (kind == "Stretch")), t=(0, 0.2))
-
-
-SCHEMES = [
-    ub.EnergyMomentum(alpha=0.1), ub.EnergyMomentumDecaying(), ub.EnergyMomentum(order=4),
-    ub.Static(), ub.EnergyMomentumStatic(),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_schemes(scheme):
-    static = isinstance(scheme, ub.Static | ub.EnergyMomentumStatic)
-    check(
-        chain(joined(ub.Rigid)),
-        scheme,
-        t=(0, 1) if static else (0, 0.4),
-        dt=0.1 if static else 0.02,
-    )
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)

@@ -82,37 +82,6 @@ def test_adaptive_steps_of_a_planar_scene(case):
     assert abs(plane.time_error / space.time_error - 1) < 1e-6
 
 
-CONTROLS = {
-    "decaying": (SCHEMES[0], 0.02), "order 4": (SCHEMES[2], 0.05),
-    "adaptive": (ub.EnergyMomentum(), ub.Adaptive(1e-3, stops=[0.1])),
-    "adaptive, order 4": (SCHEMES[2], ub.Adaptive(1e-3, stops=[0.1])),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("case", CONTROLS)
-def test_a_checkpoint_changes_no_bit(case, shared_path):
-    scheme, dt = CONTROLS[case]
-    arguments = {"t": (0, 0.2), "dt": dt}
-    scene = crane()
-    whole = ub.simulate(scene, scheme, **arguments)
-    backup = ub.Checkpoint(shared_path / "run.h5", every=1)
-    ub.simulate(scene, scheme, **arguments, checkpoint=backup, until=lambda now: now.t >= 0.1)
-    resumed = ub.simulate(scene, scheme, **arguments, checkpoint=backup)
-    assert resumed.times.tobytes() == whole.times.tobytes()
-    for place in (scene.beams[1].at(0.4), scene.bodies[0].middle):
-        assert resumed.displacement(place).tobytes() == whole.displacement(place).tobytes()
-    assert whole.energy.worst < 1e-9
-
-
-@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), SCHEMES[0], SCHEMES[2]], ids=str)
-def test_start_changes_no_bit(scheme):
-    scene, more = in_space(), {"dt": 1 / 32}
-    whole, first = (ub.simulate(scene, scheme, t=(0, t), **more) for t in (2, 1))
-    second = ub.simulate(scene, scheme, t=(1, 2), start=first, **more)
-    for place in (scene.beams[0].at(0.3), scene.beams[1].start):
-        assert (whole.displacement(place)[-1] == second.displacement(place)[-1]).all()
-
-
 def test_start_with_another_scheme_keeps_the_rotations():
     """Only the decaying scheme has changes of strains among the states of its cells."""
     scene, more = in_space(), {"dt": 0.05}
@@ -141,17 +110,6 @@ def test_order_4_is_refused_for_scenes_that_dissipate():
         ub.simulate(scene, ub.EnergyMomentum(order=4), t=(0, 1), dt=0.1)
 
 
-@pytest.mark.parametrize("dt", [0.02, 0.1, 0.2])
-def test_drift_of_a_flight(dt):
-    """Energy and momenta of a beam that tumbles in space for 1000 steps."""
-    first = ub.simulate(flight(), ub.EnergyMomentum(), t=(0, 5), dt=dt)
-    arguments = {"t": (5, 5 + 1000 * dt), "dt": dt, "newton": EXACT}
-    run = ub.simulate(first.scene, ub.EnergyMomentum(), start=first, **arguments)
-    linear, angular = np.split(run.momentum(), 2, axis=1)
-    for values, drift in ((run.energy.total, 1e-12), (linear, 1e-11), (angular, 1e-12)):
-        assert np.abs(values - values[0]).max() < drift * np.linalg.norm(values[0])
-
-
 def test_drift_of_many_turns():
     """20 000 steps about the centre of mass, of which many nodes turn a thousand times."""
     scene = flight()
@@ -177,19 +135,6 @@ def test_a_step_turns_a_node_by_two_radians():
         ub.simulate(
             scene, ub.EnergyMomentum(), t=(0, 1), dt=ub.Adaptive(1.0, first=0.1, shortest=0.05),
         )  # fmt: skip
-
-
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()], ids=str)
-def test_start_in_statics_changes_no_bit(scheme):
-    """The works of the first step are those of the forces at the end of the earlier run."""
-    beam = ub.Beam((0, 0, 0), (0, 1, 2), ub.Section(**STIFF, **OTHER), cells=4)
-    load = ub.PointLoad(beam.end, force=(30, 5, 0), moment=(3, 0, 9), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    more = {"dt": 1 / 8}
-    whole, first = (ub.simulate(scene, scheme, t=(0, t), **more) for t in (1, 0.5))
-    second = ub.simulate(scene, scheme, t=(0.5, 1), start=first, **more)
-    assert whole.substeps == first.substeps + second.substeps == 8
-    assert (whole.displacement(beam.end)[4:] == second.displacement(beam.end)).all()
 
 
 AT, AXIS = (0.3, 0.7, 0.2), (0.36, 0.48, 0.8)
