@@ -242,6 +242,13 @@ def test_defaults_of_steel():
     assert pytest.approx(200e9 * ipe.shape.A, rel=CLOSE) == other.EA
     with raises("'IPE 310' is not in the table of IPE, HEA", "similar designations are IPE300"):
         st.steel("IPE 310")
+    for wrong, similar in (
+        ("W14X91", "W14X90, W14X99"),
+        ("HSS8X4X1", "HSS8X4X1/"),
+        ("HE(200", "IPE200"),
+    ):
+        with raises(f"similar designations are {similar}"):
+            st.steel(wrong)
 
 
 # -- fibres ----------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial, reduce
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -23,7 +23,7 @@ from ufl_beam.model.law_functions import (
     where,
 )
 from ufl_beam.model.material_law import State
-from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.records import Instance, Positive, Record
 
 OWN_LAW = "state a ConnectorLaw of your own"
 """Advice in the error that a subclass of a closed class raises."""
@@ -121,8 +121,9 @@ class Backbone(Record):
                 f"elastic stiffness {stiffness:.4g} N m/rad"
             )
         falls = largest / self.post_capping
-        last, steep, ultimate = 2 * largest, 0.0, min(self.ultimate, UNBOUNDED)
-        if ultimate < UNBOUNDED:
+        last, steep, ultimate = 2 * largest, 0.0, 0.0
+        if math.isfinite(self.ultimate):
+            ultimate = self.ultimate
             last = max(largest - falls * (ultimate - caps), self.residual * limit)
             last = last if last > 0.0 else largest  # the strength is lost before
             steep = max(last / (FALL * ultimate), 2 * falls)
@@ -133,77 +134,67 @@ class Backbone(Record):
             "falls": falls,
             "residual": self.residual * limit,
             "last": last,
-            "ultimate": ultimate,
+            "top": last + steep * ultimate,
             "steep": steep,
             "largest": largest,
         }
 
 
-class _Bound(NamedTuple):
-    """Bound of positive moments: straight lines of a deteriorated backbone."""
+class _Line(NamedTuple):
+    """Straight line of moments over rotations."""
 
-    first: Values  # hardening line: intercept with the axis of moments
-    hardening: Values  # and slope
-    reference: Values  # falling line: intercept
-    falls: Values  # and fall of the moment per rotation
-    residual: Values
-    most: Values  # largest moment
-    last: Values  # moment at the ultimate rotation
-    ultimate: Values
-    steep: Values  # fall of the moment per rotation after the ultimate one
-    least_slope: Values  # in place of zero, where a slope is a divisor
-
-    def breaking(self, x: Values) -> Values:
-        """Return the moment of the line that begins at the ultimate rotation."""
-        return self.last + self.steep * (self.ultimate - x)
-
-    def fallen(self, x: Values) -> Values:
-        """Return the moment on the falling line, or a smaller one after the ultimate rotation."""
-        falling = larger(self.residual, self.reference - self.falls * x)
-        return positive(smaller(self.breaking(x), falling))
+    intercept: Values
+    slope: Values
 
     def at(self, x: Values) -> Values:
-        lines = smaller(self.first + self.hardening * x, self.reference - self.falls * x)
-        bound = smaller(self.most, larger(self.residual, lines))
-        return positive(smaller(self.breaking(x), bound))
+        return self.intercept + self.slope * x
+
+    def meets(self, stiffness: Values, p: Values) -> Values:
+        """Return the rotation where an elastic line, which starts at ``p``, meets this one."""
+        return (self.intercept + stiffness * p) / (stiffness - self.slope)
+
+    def crosses(self, other: _Line, least_slope: float) -> Values:
+        """Return the rotation where a less steep line crosses this one."""
+        return (other.intercept - self.intercept) / larger(self.slope - other.slope, least_slope)
+
+
+class _Bound(NamedTuple):
+    """Bound of positive moments: lines of a deteriorated backbone."""
+
+    hardening: _Line
+    falling: _Line
+    residual: _Line
+    most: _Line  # largest moment
+    breaking: _Line  # after the ultimate rotation
+    least_slope: float  # in place of zero, where a slope is a divisor
+
+    def _of(self, value: Callable[[_Line], Values]) -> Values:
+        """Combine moments on the lines, or rotations where an elastic line meets them."""
+        lines = smaller(value(self.hardening), value(self.falling))
+        bound = smaller(value(self.most), larger(value(self.residual), lines))
+        return smaller(value(self.breaking), bound)
+
+    def at(self, x: Values) -> Values:
+        return positive(self._of(lambda line: line.at(x)))
 
     def meets(self, stiffness: Values, p: Values) -> Values:
         """Return the rotation where an elastic line, which starts at ``p``, meets the bound."""
-        hardening = (self.first + stiffness * p) / (stiffness - self.hardening)
-        falling = (self.reference + stiffness * p) / (stiffness + self.falls)
-        breaking = (self.breaking(0.0) + stiffness * p) / (stiffness + self.steep)
-        lines = larger(self.residual / stiffness + p, smaller(hardening, falling))
-        bound = smaller(self.most / stiffness + p, lines)
-        return larger(p, smaller(breaking, bound))
+        return larger(p, self._of(lambda line: line.meets(stiffness, p)))
 
-    def integral(self, start: Values, end: Values) -> Values:
-        """Return the integral of the bound, which is linear between its kinks."""
-        up, down, steep, steeper = (
-            larger(slope, self.least_slope)
-            for slope in (self.hardening, self.falls, self.steep, self.steep - self.falls)
-        )
-        caps, top = (self.reference - self.first) / (up + down), self.breaking(0.0)
-        lines = smaller((top - self.residual) / steep, (top - self.reference) / steeper)
-        breaks = larger((top - self.most) / steep, lines)
-        kinks = (
-            smaller(caps, (self.residual - self.first) / up),
-            smaller(caps, (self.most - self.first) / up),
-            larger(caps, (self.reference - self.most) / down),
-            larger(caps, (self.reference - self.residual) / down),
-        )
-        kinks = (*(smaller(kink, breaks) for kink in kinks), breaks, top / steep)
-        return _integral(self.at, start, (*kinks, end))
+    def kinks(self) -> list[Values]:
+        """Return rotations between which the bound is linear, in increasing order."""
 
+        def at(one: _Line, other: _Line) -> Values:
+            return one.crosses(other, self.least_slope)
 
-def _integral(at: Callable[[Values], Values], start: Values, kinks: Sequence[Values]) -> Values:
-    """Integrate from ``start`` to the last of the kinks, between which ``at`` is linear."""
-    total, x, value = 0.0, start, at(start)
-    for kink in kinks:
-        next_x = smaller(kinks[-1], larger(x, kink))
-        next_value = at(next_x)
-        total += (next_x - x) * (value + next_value) / 2
-        x, value = next_x, next_value
-    return total
+        hardening, falling, residual, most, breaking, _ = self
+        caps, none = at(hardening, falling), _Line(0.0, 0.0)
+        breaks = smaller(at(residual, breaking), at(falling, breaking))
+        breaks = larger(at(most, breaking), breaks)
+        rising = [smaller(caps, at(hardening, line)) for line in (residual, most)]
+        falls = [larger(caps, at(line, falling)) for line in (most, residual)]
+        before = [smaller(kink, breaks) for kink in rising + falls]
+        return [*before, breaks, at(none, breaking)]
 
 
 class _Reloading(NamedTuple):
@@ -211,50 +202,36 @@ class _Reloading(NamedTuple):
 
     backbone: _Bound
     start: Values  # rotation where the first line begins at zero moment
-    first: Values  # slopes of both lines
-    second: Values
+    first: _Line
+    second: _Line  # never less steep
     target: Values  # rotation where the second line ends
-    moment: Values  # moment there
-
-    def lines(self, x: Values) -> Values:
-        """Return the moment on the lines, of which the second one is never less steep."""
-        second = self.moment - self.second * (self.target - x)
-        return positive(larger(self.first * (x - self.start), second))
 
     def at(self, x: Values) -> Values:
-        return where(below(x, self.target), self.lines(x), self.backbone.at(x))
+        lines = positive(larger(self.first.at(x), self.second.at(x)))
+        return where(below(x, self.target), lines, self.backbone.at(x))
 
     def meets(self, stiffness: Values, p: Values) -> Values:
         """Return the rotation where an elastic line, which starts at ``p``, meets the bound."""
-        first = (stiffness * p - self.first * self.start) / (stiffness - self.first)
-        root = self.moment - self.second * self.target
-        x = larger(p, larger(first, (root + stiffness * p) / (stiffness - self.second)))
+        lines = larger(self.first.meets(stiffness, p), self.second.meets(stiffness, p))
+        x = larger(p, lines)
         return where(below(x, self.target), x, self.backbone.meets(stiffness, p))
 
-    def integral(self, start: Values, end: Values) -> Values:
-        last, steeper = larger(start, smaller(end, self.target)), self.second - self.first
-        root = self.second * self.target - self.moment
-        corner = (root - self.first * self.start) / larger(steeper, self.backbone.least_slope)
-        total = _integral(self.lines, start, (self.start, corner, last))
-        return total + self.backbone.integral(larger(start, self.target), larger(end, self.target))
+    def kinks(self) -> list[Values]:
+        """Return rotations between which the bound is linear, in increasing order."""
+        corner = self.second.crosses(self.first, self.backbone.least_slope)
+        before = [smaller(kink, self.target) for kink in (self.start, corner)]
+        return [*before, self.target, *self.backbone.kinks()]
 
 
-class _Excursion(NamedTuple):
-    """State of a deteriorating hinge at the beginning of a step, seen along the moment.
-
-    Attributes:
-        crosses: True where the moment changes its sign in the step, so that an excursion begins.
-        p: Plastic rotation, positive in the direction of the moment.
-        before: Unloading stiffness before this excursion, as a fraction of the elastic one.
-        ratios: Ratios β^(1/c) of the excursion that ends, by the names of the modes.
-        sided: Function that returns a variable or number of the direction of the moment.
-    """
-
-    crosses: Values
-    p: Values
-    before: Values
-    ratios: Mapping[str, Values]
-    sided: Callable[..., Values]
+def _integral(bound: _Bound | _Reloading, start: Values, end: Values) -> Values:
+    """Return the integral of a bound from ``start`` to ``end``, by trapezoids between kinks."""
+    total, x, value = 0.0, start, bound.at(start)
+    for kink in (*bound.kinks(), end):
+        next_x = smaller(end, larger(x, kink))
+        next_value = bound.at(next_x)
+        total += (next_x - x) * (value + next_value) / 2
+        x, value = next_x, next_value
+    return total
 
 
 @dataclass(frozen=True)
@@ -345,19 +322,19 @@ class _DeterioratingHinge(Record, ConnectorLaw):
 
         # the bound, at x >= 0 of moments that are positive in this excursion
         backbone = _Bound(
-            first=basic * sided("first"), hardening=basic * sided("hardening"),
-            reference=falling * sided("reference"), falls=sided("falls"),
-            residual=sided("residual"),
-            most=most * sided("largest"), last=sided("last"), ultimate=sided("ultimate"),
-            steep=sided("steep"), least_slope=1e-12 * self.stiffness,
-        )  # fmt: skip
-        bound, path = self._path(backbone, state, _Excursion(crosses, p, before, ratios, sided))
+            hardening=_Line(basic * sided("first"), basic * sided("hardening")),
+            falling=_Line(falling * sided("reference"), -sided("falls")),
+            residual=_Line(sided("residual"), 0.0),
+            most=_Line(most * sided("largest"), 0.0),
+            breaking=_Line(sided("top"), -sided("steep")),
+            least_slope=1e-12 * self.stiffness,
+        )
+        bound, path = self._path(backbone, state, crosses, p, before, ratios, sided)
         limit = bound.at(x)
         flows = below(limit, stiffness * (x - p))
         start = bound.meets(stiffness, p)
-        work = (
-            dissipated + stiffness * (start - p) ** 2 / 2 + bound.integral(start, larger(x, start))
-        )
+        work = dissipated + stiffness * (start - p) ** 2 / 2
+        work += _integral(bound, start, larger(x, start))
         energy = work - limit**2 / (2 * before * self.stiffness)
         ratio = lost(data["unloading_energy"], spent, energy)
         least = larger(data["least"], path["least_rest"]) if path else data["least"]
@@ -367,11 +344,13 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         def changed(new: Values, old: Values) -> Values:
             return where(flows, new, old)
 
-        fallen = smaller(most, backbone.fallen(x) / sided("largest"))
+        breaking = backbone.breaking.at(x)
+        fallen = larger(backbone.residual.intercept, backbone.falling.at(x))
+        fallen = smaller(most, positive(smaller(breaking, fallen)) / sided("largest"))
         if path:  # on the way to the target the moment is below the backbone
             fallen = where(below(x, path["target"]), most, fallen)
         most = changed(fallen, most)
-        reverse = changed(smaller(reverse, positive(backbone.breaking(x)) / sided("last")), reverse)
+        reverse = changed(smaller(reverse, positive(breaking) / sided("last")), reverse)
         new = {
             "plastic": direction * changed(x - limit / after, p),
             "side": direction,
@@ -393,9 +372,20 @@ class _DeterioratingHinge(Record, ConnectorLaw):
         return {name: value - getattr(state, name) for name, value in new.items()}
 
     def _path(
-        self, backbone: _Bound, state: State, excursion: _Excursion
-    ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
-        """Return the bound of an excursion, and the new values of the variables of its path."""
+        self, backbone: _Bound, state: State, crosses: Values, p: Values, before: Values,
+        ratios: Mapping[str, Values], sided: Callable[..., Values],
+    ) -> tuple[_Bound | _Reloading, dict[str, Values]]:  # fmt: skip
+        """Return the bound of an excursion, and the new values of the variables of its path.
+
+        Args:
+            backbone: Deteriorated backbone in the direction of the moment.
+            state: Variables at the beginning of the step.
+            crosses: True where the moment changes its sign in the step: an excursion begins.
+            p: Plastic rotation, positive in the direction of the moment.
+            before: Unloading stiffness before this excursion, as a fraction of the elastic one.
+            ratios: Ratios β^(1/c) of the excursion that ends, by the names of the modes.
+            sided: Function that returns a variable or number of the direction of the moment.
+        """
         return backbone, {}
 
 
@@ -482,8 +472,8 @@ class PinchingHinge(_DeterioratingHinge):
         >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[base])
     """
 
-    kappa_F: Annotated[float, partial(require_number, positive=True)] = 1.0
-    kappa_D: NotNegative = 0.0
+    kappa_F: Annotated[float, partial(require_number, positive=True, at_least=0, at_most=1)] = 1.0
+    kappa_D: Annotated[float, partial(require_number, at_least=0, at_most=1)] = 0.0
     reloading: FromZeroOrInfinite = math.inf
 
     modes: ClassVar[tuple[str, ...]] = (*_DeterioratingHinge.modes, "reloading")
@@ -498,11 +488,6 @@ class PinchingHinge(_DeterioratingHinge):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("kappa_F", "kappa_D"):
-            if getattr(self, name) > 1.0:
-                raise ModelError(
-                    f"PinchingHinge: {name} = {getattr(self, name):g} is a fraction, at most 1"
-                )
         sides = self._backbones.items()
         yields = {f"yields_{side}": x.yield_limit / self.stiffness for side, x in sides}
         more = yields | {name: getattr(self, name) for name in ("kappa_F", "kappa_D")}
@@ -510,9 +495,9 @@ class PinchingHinge(_DeterioratingHinge):
         vars(self).update(more)
 
     def _path(
-        self, backbone: _Bound, state: State, excursion: _Excursion
-    ) -> tuple[_Bound | _Reloading, dict[str, Values]]:
-        crosses, p, before, ratios, sided = excursion
+        self, backbone: _Bound, state: State, crosses: Values, p: Values, before: Values,
+        ratios: Mapping[str, Values], sided: Callable[..., Values],
+    ) -> tuple[_Bound | _Reloading, dict[str, Values]]:  # fmt: skip
         stiffness, least = before * self.stiffness, 1e-12 * sided("yields")
         farther = 1 + ratios["reloading"] ** self.exponent
         aims = sided("peak", vars(state)) * sided("yields") * farther
@@ -528,9 +513,8 @@ class PinchingHinge(_DeterioratingHinge):
         # otherwise the elastic line reaches the backbone before the target
         reloads = below((1 + 1e-6) * moment, stiffness * (target - start))
         first, second = where(reloads, first, 0.0), where(reloads, second, 0.0)
-        bound = _Reloading(
-            backbone, start, first, second, where(reloads, target, -UNBOUNDED), moment
-        )
+        lines = _Line(-first * start, first), _Line(moment - second * target, second)
+        bound = _Reloading(backbone, start, *lines, where(reloads, target, -UNBOUNDED))
         least_rest = where(crosses, STEEPER * second / self.stiffness, state.least_rest)
         return bound, {"start": start, "target": target, "least_rest": least_rest}
 

@@ -120,17 +120,14 @@ class Fragility(NamedTuple):
         middle = float(np.exp(np.log(im).mean()))
         x = np.log(im / middle)
 
-        def loss(factors: Array) -> tuple[float, Array]:
-            """Return the negative logarithm of the likelihood, and its gradient."""
+        def loss(factors: Array) -> Any:
+            """Return the negative logarithm of the likelihood, also of complex factors."""
             w = factors[0] + factors[1] * x
-            up, down = scipy.special.log_ndtr(w), scipy.special.log_ndtr(-w)
-            density = -(w**2) / 2 - math.log(2 * math.pi) / 2
-            slope = -z * np.exp(density - up) + (n - z) * np.exp(density - down)
-            return -float(z @ up + (n - z) @ down), np.array([slope.sum(), slope @ x])
+            return -(z @ scipy.special.log_ndtr(w) + (n - z) @ scipy.special.log_ndtr(-w))
 
         # The loss is convex in these factors, so that the minimum is unique.
         a, b = scipy.optimize.minimize(
-            loss, np.array([0.0, 1.0]), jac=True, method="BFGS", options={"gtol": 1e-9}
+            loss, np.array([0.0, 1.0]), jac="cs", method="BFGS", options={"gtol": 1e-9}
         ).x
         if not b > 0:
             raise ArgumentError(

@@ -37,13 +37,6 @@ from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton
 
-UNITS = {
-    3: (("N", "kN"), ("V", "kN"), ("M", "kN m")),
-    6: (("N", "kN"), ("V2", "kN"), ("V3", "kN"), ("T", "kN m"), ("M2", "kN m"), ("M3", "kN m")),
-}
-"""Section forces of the plane and of space with their units in texts, in which values in SI units
-are divided by 1000."""
-
 
 @in_one_line
 class Governing(NamedTuple):
@@ -148,7 +141,8 @@ class LoadCombinations(Rich):
         lines = [f"{repr(self)[1:-1]}; extremes of section forces and their combinations"]
         for beam in first.scene.beams:
             reached = self.section_forces(beam)
-            for k, (name, unit) in enumerate(UNITS[reached.low.shape[1]]):
+            for k, name in enumerate(first.diagram(beam)._fields[1:]):
+                unit = "kN m" if name[0] in "MT" else "kN"  # SI units are divided by 1000
                 low, high = int(reached.low[:, k].argmin()), int(reached.high[:, k].argmax())
                 lines.append(
                     f"  {beam.name:12s} {name} {reached.low[low, k] / 1e3:10.2f} {unit:4s} "

@@ -6,8 +6,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from difflib import get_close_matches
 from functools import cache, lru_cache
+from heapq import nsmallest
 from pathlib import Path
 from typing import Any
 
@@ -192,16 +192,16 @@ def _torsion_of_flanged(
 
 
 def _similar(name: str, table: Iterable[str]) -> list[str]:
-    """Return five designations of the same series, with the nearest sizes."""
+    """Return five designations, of the same series if it exists, with the nearest sizes."""
 
-    def series_and_size(name: str) -> tuple[str, float]:
-        series, size = re.match(r"([A-Z]*)(\d*)", name).groups()  # type: ignore[union-attr]
-        return series, float(size or 0)
+    def parts(text: str) -> tuple[str, list[int]]:
+        return re.split(r"\d", text)[0], [int(size) for size in re.findall(r"\d+", text)]
 
-    series, size = series_and_size(name)
-    others = [other for other in table if series_and_size(other)[0] == series]
-    nearest = sorted(others, key=lambda other: abs(series_and_size(other)[1] - size))[:5]
-    return nearest or get_close_matches(name, table, n=5, cutoff=0.0)
+    def distance(other: str) -> tuple[bool, list[int]]:
+        (series, sizes), (own, wanted) = parts(other), parts(name)
+        return series != own, [abs(a - b) for a, b in zip(sizes, wanted, strict=False)]
+
+    return nsmallest(5, table, key=distance)
 
 
 @cache
