@@ -2,6 +2,7 @@
 """Analyses in space: vibration, buckling, mechanisms, paths, derivatives of runs."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -143,6 +144,20 @@ def test_lateral_buckling_of_a_cantilever():
         assert (shapes.errors < 1e-6).all()
         found.append(np.abs(shapes.factors[0]))
     assert abs(extrapolated(found) / exact - 1) < (NARROW.EI2 + NARROW.GJ) / NARROW.EI + 1e-4
+
+
+@pytest.mark.parametrize("z", [[], [0.0]], ids=["plane", "space"])
+def test_buckling_under_other_loads_than_those_of_the_state(z):
+    """New loads grow from zero to their values, and others vanish."""
+    more = {"EI2": 2e3, "GA3": 1e7, "GJ": 1e3} if z else {}
+    beam = ub.Beam((0, 0, *z), (2, 0, *z), ub.Section(EA=1e7, GA=1e7, EI=1e3, **more), cells=8)
+    support = [ub.Clamped(beam.start)]  # the column bears 617 N
+    one, two, three = (ub.PointLoad(beam.end, force=(-x, 0, *z)) for x in (100.0, 200.0, 50.0))
+    scene = ub.Scene([beam], supports=support, loads=[one, two])
+    (critical,) = ub.buckling(replace(scene, loads=[one]), 1).factors
+    at = ub.simulate(replace(scene, loads=[one, three]), ub.Static(), t=(0, 1), dt=1.0)
+    (factor,) = ub.buckling(scene, 1, at=at).factors
+    assert 1.5 + 1.5 * factor == pytest.approx(critical, rel=1e-7)  # times 100 N
 
 
 def test_buckling_in_uniform_bending():
