@@ -23,9 +23,6 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import DENSE, ROUND_OFF, SHIFT, ZERO
 
-Found = tuple[Array, Array | Complex, Array, Array]
-"""Results of :meth:`SmallMotions.buckling`."""
-
 Equilibrium = tuple[csr_array, Callable[[Array], float]]
 """Stiffness in an equilibrium, and the work xᵀ K x of a shape x, without the matrix's round-off."""
 
@@ -170,7 +167,7 @@ class SmallMotions(Linearization):
 
     # -- buckling ------------------------------------------------------------------------------
 
-    def buckling(self, n: int, static: Simulation) -> Found:
+    def buckling(self, n: int, static: Simulation) -> tuple[Array, Array | Complex, Array, Array]:
         """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
 
         The shapes are (n,), (size, n) and (n,).  The stiffness vanishes in the equilibrium at a
