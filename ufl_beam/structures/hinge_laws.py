@@ -23,7 +23,7 @@ from ufl_beam.model.law_functions import (
     where,
 )
 from ufl_beam.model.material_law import State
-from ufl_beam.model.records import Instance, Positive, Record
+from ufl_beam.model.records import Instance, Number, Positive, Record
 
 OWN_LAW = "state a ConnectorLaw of your own"
 """Advice in the error that a subclass of a closed class raises."""
@@ -39,7 +39,7 @@ STEEPER = 1.1
 UNBOUNDED = 1e100  # number that stands for infinity, for which compiled expressions would be NaN
 
 FromZeroOrInfinite = Annotated[float, partial(require_number, positive=True, infinite=True)]
-Exponent = Annotated[float, partial(require_number, at_least=1.0)]
+AtLeastOne = Annotated[float, partial(require_number, at_least=1.0)]
 
 
 @closed(OWN_LAW)
@@ -72,26 +72,19 @@ class Backbone(Record):
     """
 
     yield_limit: Positive
-    capping: float
+    capping: Number
     post_capping: FromZeroOrInfinite = math.inf
-    overstrength: float = 1.0
-    residual: float = 0.0
+    overstrength: AtLeastOne = 1.0
+    residual: Number = 0.0
     ultimate: FromZeroOrInfinite = math.inf
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("capping", "overstrength", "residual"):
-            require_number(getattr(self, name), f"Backbone: {name}")
         if self.capping <= 0.0:
             raise ModelError(
                 f"Backbone: capping = {self.capping:g} rad is the plastic rotation from yielding "
                 "to capping; the backbone would turn back at the yield moment, so give a positive "
                 "rotation"
-            )
-        if self.overstrength < 1.0:
-            raise ModelError(
-                f"Backbone: overstrength = {self.overstrength:g}; the capping moment must be at "
-                "least the yield moment"
             )
         if not 0.0 <= self.residual <= 1.0:
             raise ModelError(
@@ -244,7 +237,7 @@ class _DeterioratingHinge(Record, ConnectorLaw):
     strength: FromZeroOrInfinite = math.inf
     softening: FromZeroOrInfinite = math.inf
     unloading: FromZeroOrInfinite = math.inf
-    exponent: Exponent = 1.0
+    exponent: AtLeastOne = 1.0
 
     entry = "plastic"
     rate_independent: ClassVar[bool] = True
@@ -423,7 +416,7 @@ class IbarraKrawinkler(_DeterioratingHinge):
             infinity, means no deterioration, here and below.
         softening: Λ of the strength after capping; rad or m.
         unloading: Λ of the unloading stiffness; rad or m.
-        exponent: Exponent c, at least 1.
+        exponent: AtLeastOne c, at least 1.
 
     Raises:
         ModelError: A number is out of range, the hardening exceeds half the stiffness, or the
@@ -456,7 +449,7 @@ class PinchingHinge(_DeterioratingHinge):
     Args:
         stiffness, backbone, negative: As of :class:`IbarraKrawinkler`, like the next two rows.
         strength, softening, unloading: Reference rotations Λ; rad or m.
-        exponent: Exponent c, at least 1.
+        exponent: AtLeastOne c, at least 1.
         kappa_F: Factor κF of the moment where both lines meet, above 0 and at most 1.
         kappa_D: Factor κD of the rotation there, from 0 to 1.
         reloading: Λ of the accelerated deterioration of the reloading stiffness; rad or m.

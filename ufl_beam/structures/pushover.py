@@ -466,8 +466,11 @@ def pushover(
             f"pushover: nothing that moves has mass, and the pattern {pattern!r} acts on masses; "
             "give sections rho or rhoA, give PointMass, or a list of loads as pattern"
         )
+    period = math.nan
+    if total > 0:
+        main, period = _main_mode(steady, start, mesh, masses, axis)
     if isinstance(pattern, str):
-        shape = _shape(pattern, place, axis, steady, start, mesh, masses)
+        shape = _shape(pattern, place, axis, steady, main, masses)
         loads = tuple(_forces(scene, axis, shape))
     sum_of_forces = sum(_along(load, axis, numbering) for load in loads)
     largest = sum(_along(load, i, numbering, abs) for load in loads for i in range(len(names)))
@@ -492,7 +495,6 @@ def pushover(
 
     weighted = np.array([(mass, mass * shape(at)) for at, mass in masses]).reshape(-1, 2)
     first, second = weighted[:, 1].sum(), (weighted[:, 1] ** 2 / weighted[:, 0]).sum()
-    period = _main_mode(steady, start, mesh, masses, axis)[1] if total > 0 else math.nan
     path, events, failure = _follow(
         loaded, control, target, steps, start, newton=newton, mesh=mesh, progress=progress
     )
@@ -587,8 +589,8 @@ def _main_mode(
 
 
 def _shape(
-    pattern: str, place: Place, axis: int, scene: Scene, start: Solution | None,
-    mesh: Mesh | None, masses: list[tuple[AttachmentPoint, float]],
+    pattern: str, place: Place, axis: int, scene: Scene, main: Shape,
+    masses: list[tuple[AttachmentPoint, float]],
 ) -> Shape:  # fmt: skip
     """Return the shape of a named pattern, which is 1 at the control place.
 
@@ -597,13 +599,11 @@ def _shape(
     """
     if pattern == "uniform":
         return lambda at: 1.0
-    form: Shape
+    form, largest = main, 1.0
     if pattern == "triangular":
         lowest = min(at.point[-1] for at, _ in masses)
         lowest = min([lowest, *(support.place.point[-1] for support in scene.supports)])
         form, largest = (lambda at: float(at.point[-1] - lowest)), scene.size
-    else:
-        (form, _), largest = _main_mode(scene, start, mesh, masses, axis), 1.0
     at_place = form(place)
     if not abs(at_place) > LEAST_MOTION * largest:
         raise ArgumentError(

@@ -270,14 +270,18 @@ class InteractionDiagram:
         Raises:
             ArgumentError: The section cannot bear N.
         """
-        N, ends = require_number(N, "moments: N"), np.sort([self.N[:-1], self.N[1:]], axis=0)
-        at = np.flatnonzero((ends[0] <= N) & (ends[1] >= N))
-        if not len(at):
+        curve = np.array([self.N, self.M])
+        _, M = _at_force(require_number(N, "moments: N"), curve[:, :-1], curve[:, 1:])
+        if not len(M):
             raise ArgumentError(f"moments: N = {N:g} N is beyond the diagram, {self!r}")
-        change = self.N[at + 1] - self.N[at]
-        along = (N - self.N[at]) / np.where(change == 0.0, 1.0, change)
-        M = self.M[at] + along * (self.M[at + 1] - self.M[at])
         return float(M.min()), float(M.max())
+
+
+def _at_force(N: float, first: Array, last: Array) -> Array:
+    """Return the points at an axial force on segments, whose first numbers are axial forces."""
+    at = np.flatnonzero((first[0] - N) * (last[0] - N) <= 0)
+    a, change = first[:, at], last[:, at] - first[:, at]
+    return np.asarray(a + change * ((N - a[0]) / np.where(change[0] == 0.0, 1.0, change[0])))
 
 
 Limits = tuple[float, float]
@@ -363,12 +367,9 @@ def interaction_diagram(
     # Segments between adjacent planes, and between adjacent steps
     begins, ends = (reached, reached[:, :-1]), (np.roll(reached, -1, axis=2), reached[:, 1:])
     first, last = (np.hstack([x.reshape(4, -1) for x in pair]) for pair in (begins, ends))
-    low, high = np.minimum(first[0], last[0]), np.maximum(first[0], last[0])
-    most, least = [], []
-    for N in np.unique([*reached[0, -1], *np.linspace(low.min(), high.max(), points)]):
-        at = (low <= N) & (high >= N)
-        a, change = first[:, at], last[:, at] - first[:, at]
-        crossed = a + change * ((N - a[0]) / np.where(change[0] == 0.0, 1.0, change[0]))
+    most, least, N = [], [], reached[0]
+    for force in np.unique([*N[-1], *np.linspace(N.min(), N.max(), points)]):
+        crossed = _at_force(force, first, last)
         most.append(crossed[:, crossed[1].argmax()])
         least.append(crossed[:, crossed[1].argmin()])
     return InteractionDiagram(*np.transpose([*most[::-1], *least, most[-1]]))
