@@ -250,3 +250,26 @@ def test_a_brittle_hinge_softens_whatever_the_steps(kind, ratio, arc, factor, by
     # The moment falls linearly with the dissipated energy; the arm shortens by second order.
     at = lost > 0.1 * energy
     assert np.abs(factor[at] - (1 - lost[at] / energy)).max() < 0.01
+
+
+def test_a_path_by_energy_goes_on_after_the_last_dissipation():
+    """One of two springs breaks, then the other bears the load: no step dissipates any more."""
+    limit, energy, stiff, rest = 10.0, 1.0, 100.0, 50.0  # N, J, N/m, N/m
+    block, ground = ub.Body((0, 0), mass=1.0, inertia=1.0), ub.ground(-1, 0)
+    breaks = ub.Spring(stiff, softening=ub.LinearSoftening(limit, energy))
+    scene = ub.Scene(
+        [], bodies=[block], supports=[ub.PrescribedDisplacement(block.middle, v=0.0, psi=0.0)],
+        connectors=[
+            ub.Slide(ground, block.middle, law, axis=(1, 0)) for law in (breaks, ub.Spring(rest))
+        ],
+        loads=[ub.PointLoad(block.middle, force=(1.0, 0), amplitude=lambda t: t)],
+    )  # fmt: skip
+    control = ub.DissipationControl(energy / 10, ub.ArcLength(0.1, factor=1e3))
+    path = ub.follow(scene, control, steps=40, until=lambda now: now.t > 20 * limit)
+    u, lost = path.displacement(block.middle)[:, 0], path.energy["hinges"]
+    assert u[-1] > 3.0
+    assert lost[-1] == pytest.approx(energy, rel=1e-9)
+    broken = lost > (1 - 1e-9) * energy
+    np.testing.assert_allclose(path.factor[broken], rest * u[broken], rtol=1e-9)
+    whole = lost == 0.0
+    np.testing.assert_allclose(path.factor[whole], (stiff + rest) * u[whole], rtol=1e-9)
