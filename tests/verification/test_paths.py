@@ -250,3 +250,27 @@ def test_a_brittle_hinge_softens_whatever_the_steps(kind, ratio, arc, factor, by
     # The moment falls linearly with the dissipated energy; the arm shortens by second order.
     at = lost > 0.1 * energy
     assert np.abs(factor[at] - (1 - lost[at] / energy)).max() < 0.01
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e3])
+def test_a_path_by_energy_goes_on_after_the_last_dissipation(factor):
+    """One of two springs breaks while the load falls, then the other bears a growing load."""
+    limit, energy, stiff, rest = 10.0, 1.0, 100.0, 50.0  # N, J, N/m, N/m
+    block, ground = ub.Body((0, 0), mass=1.0, inertia=1.0), ub.ground(-1, 0)
+    breaks = ub.Spring(stiff, softening=ub.LinearSoftening(limit, energy))
+    scene = ub.Scene(
+        [], bodies=[block], supports=[ub.PrescribedDisplacement(block.middle, v=0.0, psi=0.0)],
+        connectors=[
+            ub.Slide(ground, block.middle, law, axis=(1, 0)) for law in (breaks, ub.Spring(rest))
+        ],
+        loads=[ub.PointLoad(block.middle, force=(limit, 0), amplitude=lambda t: t)],
+    )  # fmt: skip
+    control = ub.DissipationControl(energy / 10, ub.ArcLength(0.1, factor=factor))
+    path = ub.follow(scene, control, steps=60, until=lambda now: now.t > 2.0)
+    u, lost = path.displacement(block.middle)[:, 0], path.energy["hinges"]
+    assert path.factor[-1] > 2.0
+    assert lost[-1] == pytest.approx(energy, rel=1e-9)
+    broken = lost > (1 - 1e-9) * energy
+    np.testing.assert_allclose(limit * path.factor[broken], rest * u[broken], rtol=1e-9)
+    whole = lost == 0.0
+    np.testing.assert_allclose(limit * path.factor[whole], (stiff + rest) * u[whole], rtol=1e-9)

@@ -82,7 +82,8 @@ def with_amplitude(load: Any, amplitude: TimeFunction) -> Load:
         return load
     if isinstance(load, MovingLoad):
         load = replace(load, position=Constant(value_at(load.position, AT, load)))
-    return replace(load, amplitude=amplitude)
+    changed: Load = replace(load, amplitude=amplitude)
+    return changed
 
 
 def grown(load: Load, factor: float = 1.0, *, end: float = 0.0, span: float = REST) -> Load:

@@ -445,12 +445,14 @@ class ArcLength(Control):
         """Return a positive number if the path continues along ``direction``.
 
         At first the sign of ``step`` decides.  Later dissipation grows in this sense or, if it does
-        not decide, the path turns by less than π/2.
+        not decide, the motion turns by less than π/2.  The load factor may turn by more, as where a
+        spring has broken and others bear the load.
         """
         if increment is None:
             return self.step * float(direction[-1])
         side = corrector.dissipation_side(corrector.simulation.q + increment[:-1], direction)
-        return side or corrector.along(corrector.weights * increment, direction)
+        motion = np.append(increment[:-1], 0.0)
+        return side or corrector.along(corrector.weights * motion, direction)
 
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
         """Solve for the end of a step; if it fails, on a plane across the predicted motion.
