@@ -272,6 +272,20 @@ def test_ranges_of_a_bar_in_closed_form():
     assert "change=10" in repr(by_limit)
 
 
+def test_an_elastic_spring_that_turns_has_no_switch():
+    """Its equation has a series for small rotations in a step, which changes no digit."""
+
+    def sprung(EI):
+        beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e5, GA=4e4, EI=EI, rhoA=1.0), cells=2)
+        ends = ub.ground(0, 0), beam.start
+        spring = ub.Turn(*ends, ub.Spring(100.0))
+        joints, loads = [ub.Revolute(*ends)], [ub.Gravity()]
+        return ub.Scene([beam], joints=joints, connectors=[spring], loads=loads)
+
+    found = ub.differentiate(sprung, {"EI": 50.0}, ub.EnergyMomentum(), t=(0, 0.1), dt=0.01)
+    assert found.ranges["EI"].change == np.inf
+
+
 @pytest.mark.parametrize("near", [1e-4, 1e-6, 1.1e-8, -1e-4])
 def test_each_side_of_a_switch_has_its_derivatives(near):
     """The bar has just begun to flow, and dissipates N_y (N - N_y) L/H; or it has not."""

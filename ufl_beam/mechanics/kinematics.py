@@ -104,11 +104,18 @@ def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
 
 
+SERIES = math.nextafter(1e-4, 1.0)
+"""Square of an angle up to which a series has a remainder below 1e-18.
+
+Both branches of a comparison with this number are equal: it is no switch for derivatives.
+"""
+
+
 def _sinc(x: Expr) -> Expr:
-    """Return sin x / x, smooth at zero; the series below 1e-2 has a remainder under 1e-18."""
+    """Return sin x / x, smooth at zero."""
     x2 = x**2
     series = 1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42))
-    small = ufl.lt(x2, 1e-4)
+    small = ufl.lt(x2, SERIES)
     return ufl.conditional(small, series, ufl.sin(x) / ufl.conditional(small, 1.0, x))
 
 

@@ -19,6 +19,7 @@ from ufl.corealg.traversal import unique_post_traversal
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, ffi, lib, struct
+from ufl_beam.mechanics.kinematics import SERIES
 
 FAR = 1e300
 """Margin of a comparison that does not matter."""
@@ -169,7 +170,8 @@ def margins(outputs: Sequence[Expr]) -> list[Expr]:
     found = dict[str, Expr]()
     for node in reversed(order.values()):  # parents come before their operands
         uses = [(c, reached[id(node), c]) for c in (False, True) if (id(node), c) in reached]
-        if uses and isinstance(node, EQ | NE | LE | LT | GE | GT):
+        compares = isinstance(node, EQ | NE | LE | LT | GE | GT)
+        if uses and compares and node.ufl_operands[1] != SERIES:
             branches = _common([conditions for _, conditions in uses])
             left, right = node.ufl_operands
             margin = left - right
