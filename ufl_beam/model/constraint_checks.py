@@ -334,7 +334,8 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
     kinds = [f"beam {i}" for i in range(len(scene.beams))]
     kinds += [f"body {i}" for i in range(len(scene.bodies))]
     texts = []
-    motions = (mode / np.abs(mode).max()).reshape(len(kinds), -1)
+    first = np.round(np.abs(mode) / np.abs(mode).max(), 9).argmax()
+    motions = (mode / mode[first]).reshape(len(kinds), -1)  # signs do not depend on round-off
     for kind, part, motion in zip(kinds, scene.parts, motions, strict=True):
         d = len(motion) // 2 + len(motion) % 2  # number of displacements
         u, ψ = motion[:d], motion[d:]
