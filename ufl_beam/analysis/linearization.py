@@ -470,10 +470,10 @@ class Linearization:
             "vibrations about the equilibrium give at=simulate(scene, Static(), ...)"
         )
 
-    def linear_change(self, call: str) -> Array:
+    def linear_change(self, call: str) -> tuple[Array, Callable[[Array], Array]]:
         """Compute the linear change of the configuration due to loads and prescribed motions.
 
-        ``call`` is the caller in messages.
+        ``call`` is the caller in messages.  The function returns the change by residuals (N).
         """
         simulation, supports = self._simulation, self._simulation.supports
         (r, T), Q = self._linearized(self.q), self._axes
@@ -492,7 +492,11 @@ class Linearization:
             factors = splu((Z.T @ T @ Z).tocsc())
         except RuntimeError:
             raise ArgumentError(f"{call}: the scene is free to move in its state") from None
-        return np.asarray(g - Z @ factors.solve(Z.T @ rest))
+
+        def change(residual: Array) -> Array:
+            return np.asarray(-(Z @ factors.solve(Z.T @ residual)))
+
+        return g + change(rest), change
 
 
 def linear_forces_of_cells(

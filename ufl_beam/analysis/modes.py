@@ -59,6 +59,10 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.term import InCells
 
+LARGEST_ERROR = 0.1
+"""Largest estimated error of a buckling factor without a warning.  The estimate is below 0.02 in
+frames under forces at their nodes, and 0.1 to 0.7 where loads along beams bend them first."""
+
 SPIN = 0.1  # mean rate of turning that is an error, as a fraction of the first frequency
 MOST_TITLES = 4  # largest number of modes in a one-line text
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
@@ -296,7 +300,8 @@ class Buckling(Shapes):
 
     Attributes:
         factors: Load factors, ``|factor|`` ascending; negative for reversed loads; (n,).
-        errors: Estimated relative errors of the factors, at most 0.02; (n,).
+        errors: Estimated relative errors of the factors; above 0.1 if the loads bend beams before
+            they buckle; (n,).
 
     Example:
         >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
@@ -311,7 +316,10 @@ class Buckling(Shapes):
     @property
     def titles(self) -> list[str]:
         """Factor of each mode by which the loads are multiplied."""
-        return [f"loads × {factor:.4g}" for factor in self.factors]
+        return [
+            f"loads × {factor:.4g}" + " (no buckling load)" * bool(error > LARGEST_ERROR)
+            for factor, error in zip(self.factors, self.errors, strict=True)
+        ]
 
 
 @each_warning_once()
@@ -399,13 +407,16 @@ def computed_modes(
 def buckling(
     scene: Scene, n: int, *, t: float = 1.0, at: StateOf | None = None, mesh: Mesh | None = None
 ) -> Buckling:
-    """Compute buckling load factors and modes, K(λ) x = 0.
+    """Compute buckling load factors and modes, (K + λ K' + λ² K''/2) x = 0.
 
     Loads and prescribed motions grow in proportion, from their values in the state ``at``, or from
-    zero without ``at`` (λ = 0), to their values at the time ``t`` (λ = 1).  K(λ) is the stiffness
-    in the equilibrium under these loads, also if they bend beams before.  If the path of equilibria
-    ends before a factor, or avoids it, as of an imperfect column, the stiffness at half of the
-    first factor yields it.  A warning names factors about which both estimates disagree.
+    zero without ``at`` (λ = 0), to their values at the time ``t`` (λ = 1).  K' and K'' are the
+    derivatives of the stiffness along this path; they include changes of forces and of
+    displacements.  Factors are exact if the path is straight, as of columns and of frames under
+    forces in line with their columns; else the error grows with the factor and with the curvature
+    of the path.  If loads bend beams long before they buckle, factors have no meaning; a warning
+    lists these factors.  In space, these factors are only estimates of the results, at which the
+    stiffness in equilibrium vanishes, also if loads bend beams before.
 
     Args:
         scene: Model.
@@ -423,8 +434,8 @@ def buckling(
             :class:`VirtualWork`.
 
     Warns:
-        ModelWarning: Some estimates of factors are complex, or far from those in equilibrium; or a
-            stop just touches.
+        ModelWarning: The stiffness of a shape does not vanish at its factor, or a stop just
+            touches.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
@@ -456,27 +467,33 @@ def buckling(
     small = SmallMotions(scene, at, t, mesh)
     require_no_spin("buckling", small, at)
     small.warn_of_limits("buckling")
-    t0 = 0.0 if at is None else float(at.times[-1])
-    growing, switch = _growing(scene, at, t0)
-    static = Simulation(growing, Static(), t0=t0, start=at, mesh=mesh, comm=MPI.COMM_SELF)
-    switch.acting = True
-    for inner in (*(cells.points for cells in static.inelastic), *static.connector_terms):
-        inner.freeze()  # as in the linearized equations
-    static.time_loop.path.slack = math.inf  # frozen points do not store the work of steps
-    with closing(static):
-        factors, shapes, errors, others = small.buckling(n, static)
+    if scene.in_space:
+        t0 = 0.0 if at is None else float(at.times[-1])  # loads grow from their values there
+        growing, switch = _growing(scene, at, t0)
+        static = Simulation(growing, Static(), t0=t0, start=at, mesh=mesh, comm=MPI.COMM_SELF)
+        switch.acting = True
+        for inner in (*(cells.points for cells in static.inelastic), *static.connector_terms):
+            inner.freeze()  # as in the linearized equations
+        static.time_loop.path.slack = math.inf  # frozen points do not store the work of steps
+        with closing(static):
+            found = small.buckling_in_space(n, static)
+    else:
+        found = small.buckling(n)
+    factors, shapes, errors, others = found
     stiff = any(beam.section.GA > 10 * beam.section.EA for beam in scene.beams)
+    wrong = (
+        ": the stiffness of their shapes does not vanish there, because the loads bend, turn or "
+        "shorten beams first"
+        + ", which GA > 10 EA makes worse (GA = 10 EA excludes shear strains as well)"
+        * stiff
+        + ". Give forces at the nodes instead of along beams, give at= a state closer to buckling, "
+        "follow the path with ub.follow, or find where a frequency of modes(..., at=) vanishes"
+    )
+    if listed := ", ".join(f"{x:.4g}" for x in factors[errors > LARGEST_ERROR]):
+        warn(f"buckling: the factors {listed} are no buckling loads{wrong}")
     if not len(factors) or (others < np.abs(factors).max()).any():
         listed = ", ".join(f"{x:.4g}" for x in np.sort(others)[:n])
-        warn(
-            f"buckling: factors of magnitude {listed} are left out: the stiffness of their shapes "
-            "does not vanish there, because the loads bend, turn or shorten beams first"
-            + ", which GA > 10 EA makes worse (GA = 10 EA excludes shear strains as well)"
-            * stiff
-            + ". Give forces at the nodes instead of along beams, give at= a state closer to "
-            "buckling, follow the path with ub.follow, or find where a frequency of "
-            "modes(..., at=) vanishes"
-        )
+        warn(f"buckling: factors of magnitude {listed} are complex and left out{wrong}")
     state = scene, small.numbering, small.q, small.turns
     return Buckling(*state, shapes, *_stresses(small, at), factors, errors)
 

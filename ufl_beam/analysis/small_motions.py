@@ -16,23 +16,21 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.analysis.linearization import Linearization
 from ufl_beam.arrays import Array, Complex
-from ufl_beam.compiled.c_library import lib
 from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.solvers import eigensolvers
 from ufl_beam.solvers.eigensolvers import DENSE, ROUND_OFF, SHIFT, ZERO
 
-Equilibrium = tuple[csr_array, Callable[[Array], float]]
-"""Stiffness in an equilibrium, and the work xᵀ K x of a shape x, without the matrix's round-off."""
+Found = tuple[Array, Array | Complex, Array, Array]
+"""Results of :meth:`SmallMotions.buckling`."""
 
 V = TypeVar("V", Array, Complex)
 
 REAL = 1e-6  # imaginary part of a buckling factor that is round-off, as a fraction
 SECOND = 1e-3  # change for second derivatives; rad, or fraction of the size of the scene
-NEAR = 0.2  # largest load of differences, as a fraction of the first buckling factor
-MOST_REFINEMENTS = 20  # largest number of iterations for a buckling factor
-SECANT = 1e-3  # change of a factor from which slopes follow, as a fraction
+NEAR = 0.2  # largest load of differences in space, as a fraction of the first buckling factor
+MOST_REFINEMENTS = 20  # largest number of iterations for a buckling factor in space
 LARGEST_CHANGE = 0.02  # largest relative change of a factor beyond half of it, without equilibrium
 REFINED = 1e-8  # change of a buckling factor in the last iteration, as a fraction
 SAME = 1e-6  # difference of factors that may be one, as a fraction
@@ -109,7 +107,7 @@ class SmallMotions(Linearization):
 
     def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
         """Return works xᵀ K x (J) of the columns of x, and whether each may be round-off."""
-        right, left = self._with_laws(self._linearized(self.q)[1])
+        right, left = self._with_laws()
         works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
         sizes = ZERO * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
         sizes += ROUND_OFF**2 * self.squares.max() * np.sum(x * (self.M @ x), axis=0)  # of x
@@ -167,38 +165,76 @@ class SmallMotions(Linearization):
 
     # -- buckling ------------------------------------------------------------------------------
 
-    def buckling(self, n: int, static: Simulation) -> tuple[Array, Array | Complex, Array, Array]:
+    def buckling(self, n: int) -> Found:
         """Compute up to n buckling factors nearest to zero, their shapes, and estimated errors.
 
-        The shapes are (n,), (size, n) and (n,).  The stiffness vanishes in the equilibrium at a
-        factor.  The stiffness of neighbouring equilibria yields estimates of factors.  A ``static``
-        simulation in the same state finds the equilibrium at each estimate, and the work of the
-        shape there yields the next estimate.  Errors are the last relative changes.  The last
-        result has the magnitudes of complex solutions, and of factors that no equilibrium confirms.
+        The shapes are (n,), (size, n) and (n,).  The factors are real solutions of
+        (K + λ K' + λ² K''/2) x = 0, with derivatives along the path q + λ u + λ² w/2 of equilibria.
+        Terms of second order matter where a stiffness is large: without them, cells with the
+        normal force N lose GA (N/EA)².  The error is the stiffness of the shape in this
+        configuration, divided by its change with log λ.  The last result has the magnitudes of
+        complex solutions.
         """
-        u, t = self.linear_change("buckling"), self._simulation.t
-        equation, supports = static.equation, static.supports
+        equation, laws = self._simulation.equation, self._laws
+        u, solve = self.linear_change("buckling")
+        T1 = self._matrix(equation.tangent_change(self.q, u))
+        w = solve(T1 @ u)
+        # K''/2 along the path; the derivative of K' along u is a central difference.
+        ε = SECOND / np.abs(u * self.numbering.scales).max()
+        terms = (self.q, w, 0.5), (self.q + ε * u, u, 0.25 / ε), (self.q - ε * u, u, -0.25 / ε)
+        T2 = sum(c * self._matrix(equation.tangent_change(q, along)) for q, along, c in terms)
+        right, left = self._with_laws()
+        K1, K2 = (csr_array(left @ T @ right) for T in (T1, T2))
+        into, out_of = csr_array(T1 @ right)[laws], csr_array(left @ T1)[:, laws]
+        flexible = csr_array(into.multiply(1 / self.tangent.diagonal()[laws, None]))
+        λ, x = eigensolvers.quadratic_near_zero(self.K, K1, K2 - out_of @ flexible, n)
+        # Solve again in the space of these shapes, because works are more accurate than matrices:
+        # the symmetric linear problem of the vectors (x, λ x), real and imaginary parts.
+        λ, x = λ[λ.imag >= 0.0], x[:, λ.imag >= 0.0]
+        pairs = np.flatnonzero(λ.imag)
+        x = np.hstack([x.real, x[:, pairs].imag])
+        by = np.diag(np.append(λ, λ[pairs]).real)
+        for j, k in enumerate(pairs, len(λ)):
+            by[k, j], by[j, k] = λ[k].imag, -λ[k].imag
+        X, Y = right @ x, left.T @ x
+        W0, W1 = equation.tangent_works(self.q, u, X, Y)
+        W2 = sum(c * equation.tangent_works(q, along, X, Y)[1] for q, along, c in terms)
+        W2 = W2 - (out_of.T @ x).T @ (flexible @ x)
+        values, mixed = eigensolvers.small(W0 - by.T @ W2 @ by, -W1 - W2 @ by - by.T @ W2)
+        real = np.abs(values.imag) <= REAL * np.abs(values)
+        factors, others = values[real].real, np.abs(values[~real])
+        order = np.argsort(np.abs(factors), kind="stable")[:n]
+        factors, mix = factors[order], mixed[:, real].real[:, order]
+        errors = []
+        for λ1, a, y in zip(factors, mix.T, (x @ mix).T, strict=True):
+            after = self._linearized(self.q + λ1 * u + λ1**2 / 2 * w)[1]
+            change = λ1 * a @ (W1 + 2 * λ1 * W2) @ a  # with the logarithm of the factor
+            errors.append(abs((y @ left) @ after @ (right @ y) / change))
+        shapes = self._nearest(n, factors, (x @ mix).astype(complex))
+        return *shapes, np.array(errors), others
 
-        def equilibrium(λ: float) -> Equilibrium:
+    def buckling_in_space(self, n: int, static: Simulation) -> Found:
+        """Compute the results of :meth:`buckling` with stiffnesses in equilibrium.
+
+        Second-order paths as in the plane would miss forces of third order, which are large in
+        slender beams that the loads bend.  So a ``static`` simulation in the same state finds the
+        equilibrium at each estimate of a factor.  The stiffness there, and its slope since the last
+        estimate, yield the next estimate.  Errors are the last changes.
+        """
+        (u, _), supports, t = self.linear_change("buckling"), static.supports, self._simulation.t
+
+        def stiffness(λ: float) -> csr_array:
             step = Step(-math.inf, t, self.q, t, t, fraction=λ)
             guess = supports.in_axes(self.q + λ * u)
             supports.move(guess, guess, step)
             q1 = static.attempt_along(step, guess, None).q1
-            lib.restart(equation.c, lib.EXACT)
-            T = self._matrix(equation.linearize(q1, step)[1])
-            right, left = self._with_laws(T)
-
-            def work(x: Array) -> float:
-                along = (right @ x)[:, None], (left.T @ x)[:, None]
-                return float(equation.stiffness_works(q1, *along)[0])
-
-            return self._reduced(T), work
+            return self._reduced(self._matrix(static.equation.linearize(q1, step)[1]))
 
         K, ε = self.K, SECOND / np.abs(u * self.numbering.scales).max()
         λ, x = np.asarray([], complex), np.zeros((K.shape[0], 0), complex)
         for _ in range(MOST_REFINEMENTS):
             try:
-                ends = [equilibrium(sign * ε)[0] for sign in (1.0, -1.0)]
+                ends = [stiffness(sign * ε) for sign in (1.0, -1.0)]
             except StepFailed:  # beyond the end of the path
                 ε /= 4
                 continue
@@ -213,7 +249,7 @@ class SmallMotions(Linearization):
         for guess in np.flatnonzero(real)[np.argsort(np.abs(λ[real]), kind="stable")]:
             if len(found) == n:
                 break
-            new = self._refined(λ[guess].real, x[:, guess].real, equilibrium, half)
+            new = self._refined(λ[guess].real, x[:, guess].real, stiffness, half)
             if new[1] > LARGEST_CHANGE:
                 others.append(abs(λ[guess]))
             elif not any(_same(new, other) for other in found):
@@ -224,47 +260,44 @@ class SmallMotions(Linearization):
         return *self._nearest(n, factors, shapes), errors[order], np.array(others)
 
     def _refined(
-        self, λ: float, x: Array, equilibrium: Callable[[float], Equilibrium], half: float
+        self, λ: float, x: Array, stiffness: Callable[[float], csr_array], half: float
     ) -> tuple[float, float, Array]:
         """Return a buckling factor near ``λ``, its last relative change, and its shape near x.
 
-        The factor is found by the secant method.  Imperfections may end the path of equilibria
-        before the factor, or bend it away.  Then the stiffness in the state and at half of the
-        first factor yield the factor.
+        Imperfections may end the path of equilibria before the factor, or bend it away.  Then the
+        stiffness at half of the first factor and its slope up to there yield the factor.
         """
 
-        def excess(λ: float, x: Array) -> tuple[float, Array]:
-            """Return by how much ``λ`` exceeds a factor that grows in proportion, and its shape."""
-            K, work = equilibrium(λ)
-            change = K - self.K
-            y = np.full(len(x), np.nan)
-            with suppress(RuntimeError):  # the stiffness is singular
-                y = splu(K.tocsc()).solve(change @ x)
-            x = y / np.abs(y).max() if np.isfinite(y).all() else x
-            return λ * work(x) / float(x @ (change @ x)), x
+        def after(
+            λ: float, x: Array, before: float, last: csr_array
+        ) -> tuple[csr_array, float, Array]:
+            K = stiffness(λ)
+            slope = (K - last) / (λ - before)
+            try:
+                x = splu(K.tocsc()).solve(slope @ x)
+            except RuntimeError:  # the stiffness is singular
+                return K, λ, x
+            x /= np.abs(x).max()
+            return K, λ - (x @ (K @ x)) / (x @ (slope @ x)), x
 
-        guess, shape, before, slope = λ, x, (1 - SECANT) * λ, 1.0
+        guess, shape, before, last = λ, x, 0.0, self.K
         with suppress(StepFailed):
-            last, x = excess(before, x)
             for _ in range(MOST_REFINEMENTS):
-                beyond, x = excess(λ, x)
-                if abs(λ - before) >= SECANT / 2 * abs(λ):
-                    slope = (beyond - last) / (λ - before)
-                before, last, λ = λ, beyond, λ - beyond / slope
+                before, (last, λ, x) = λ, after(λ, x, before, last)
                 if (change := abs(λ / before - 1)) <= REFINED:
                     return λ, change, x
         with suppress(StepFailed):
-            λ = math.copysign(half, guess)
-            beyond, x = excess(λ, shape)
-            return λ - beyond, abs((λ - beyond) / guess - 1), x
+            _, λ, x = after(math.copysign(half, guess), shape, 0.0, self.K)
+            return λ, abs(λ / guess - 1), x
         return guess, math.inf, shape
 
-    def _with_laws(self, T: csr_array) -> tuple[csr_array, csr_array]:
+    def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return the matrices R and L that reduce the tangent T of all unknowns to K = L T R.
 
-        Columns of R and rows of L are motions with the forces that follow from force laws.
+        Columns of R and rows of L are motions with the forces that follow from force laws.  The
+        derivative of K is L T' R.
         """
-        laws, Z = self._laws, self._Z
+        (_, T), laws, Z = self._linearized(self.q), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
         columns = eye_array(self.numbering.size, format="csr")[:, laws]
         right = Z - columns @ (flexibility @ (T[laws, :] @ Z))

@@ -455,10 +455,15 @@ class InelasticCells(BeamCells):
         self._about(q)
         yield from super().each_element(q)
 
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
         """See the base class."""
         self._about(q1)
-        return super().tangent_work(q1, x, y)
+        super().add_tangent_change(q1, u)
+
+    def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
+        """See the base class."""
+        self._about(q1)
+        return super().tangent_work(q1, x, y, u)
 
     def about_state(self) -> tuple[Index, Array, Array]:
         """See the base class; D is for a step with the length of the last step."""

@@ -415,18 +415,32 @@ class Block(LoadTerm):
             rows = states.transpose(0, 2, 1).reshape(-1, number)[: len(indices)]
             states[:] = in_batches(archive.rows(self._elements.name, indices, rows), BATCH)
 
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
-        """Return y·(K x) with the tangent K; J.
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """See the base class."""
+        made = kernels(self.statement.frozen)
+        if (change := made.change) is not None:
+            self._along(change, q1, [u], 0, self._entries(made), doubles(self._A.data))
+
+    def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
+        """Return y·(K x), J; K is the tangent or, with ``u``, its derivative along ``u``.
 
         The work is a sum over elements, computed from their relative motions.  A product with the
         matrix would have the round-off of axial and shear stiffness.  In slender cells this
         round-off may exceed the bending stiffness.
         """
-        work = self._kernels.tangent_work
-        return float(self._along(work, q1, [x, y], 1).sum()) if work is not None else 0.0
+        along = [x, y] if u is None else [x, y, u]
+        work = self._kernels.tangent_work if u is None else self._kernels.change_of_tangent_work
+        parts = len(along) - 1
+        return float(self._along(work, q1, along, parts).sum()) if work is not None else 0.0
 
-    def _along(self, function: Any, q: Array, directions: Sequence[Array], parts: int = 0) -> Array:
-        """Return outputs at ``q`` of a function of motions, which ends with ``parts`` zeros."""
+    def _along(
+        self, function: Any, q: Array, directions: Sequence[Array], parts: int = 0,
+        entries: Any = ffi.NULL, tangent: Any = ffi.NULL,
+    ) -> Array:  # fmt: skip
+        """Return outputs at ``q`` of a function of motions, or add them to the tangent.
+
+        The last inputs of the function are ``parts`` zeros.
+        """
         batches, width, lanes = self._w.shape
         out: Array = np.zeros(batches * function.outputs * lanes)
         width += len(directions) * self._c.unknowns + parts
@@ -434,7 +448,7 @@ class Block(LoadTerm):
         lib.evaluate_along(
             self._c, function, doubles(q), len(directions),
             ffi.new("double *[]", [doubles(u) for u in directions]), width, doubles(w),
-            doubles(out),
+            doubles(out), entries, tangent,
         )  # fmt: skip
         return self.outputs(function, out)
 

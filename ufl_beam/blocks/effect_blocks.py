@@ -255,3 +255,7 @@ class PythonBlock(EffectBlock):
             f"{self.statement.label} has no derivative, because its equations are in Python; state "
             "them in UFL"
         )
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Raise :class:`ModelError`: slopes are differences."""
+        self.derivatives(None)  # type: ignore[arg-type]

@@ -238,6 +238,17 @@ class UserLaw:
                 return change / (2 * ε_motion)
         return (self.force(e + ε) - self.force(e - ε)) / (2 * ε)
 
+    def bend(self, e: float) -> float:
+        """Return minus the second derivative of the force by a fourth-order difference.
+
+        The increment is a thousandth of the size of the scene, or of a radian.  The relative error
+        is below 1e-8 if the slope changes over a thirtieth of that size or more.  Round-off adds
+        about 1e-10 of the force divided by the square of that size.
+        """
+        ε, weights = self._small, (-1.0, 16.0, -30.0, 16.0, -1.0)
+        forces = [w * self.force(e + k * ε) for k, w in zip(range(-2, 3), weights, strict=True)]
+        return -sum(forces) / (12 * ε**2)
+
 
 # -- connectors ------------------------------------------------------------------------------------
 
@@ -269,23 +280,29 @@ class OfFunctions(OnConnector):
 
     @property
     def modes(self) -> list[str]:
-        """Line of the force; new state; derivatives by e1, e0 and the variables."""
+        """Line of the force and its change; new state; derivatives by e1, e0 and the variables."""
         rows, columns = range(1 + self.variables), range(2 + self.variables)
         table = (f"slope {i} {j}" for i in rows for j in columns)
         new = (f"new {k}" for k in range(self.variables))
-        return ["force", "new energy", *new, *table]
+        return ["force", "bend", "new energy", *new, *table]
 
     def law(self, at: Inputs, step: Step) -> Equations:
         """See the base class."""
         (e0,), (e1,), (work,) = step.e0, step.e1, step.work
         before = [at[f"state {k}"] for k in range(self.variables)]
 
-        def line(row: int) -> Any:
+        def line(row: int, slope: Any, moved: Any) -> Any:
             more = sum(at[f"slope {row} {2 + k}"] * z for k, z in enumerate(before))
-            return at[f"slope {row} 0"] * e1 + at[f"slope {row} 1"] * e0 + more + at[f"shift {row}"]
+            return slope * moved + at[f"slope {row} 1"] * e0 + more + at[f"shift {row}"]
 
-        force = at.stage(at["force"], line(0))
-        new = [at.stage(at[f"new {k}"], line(1 + k)) for k in range(self.variables)]
+        # The slope of the force changes with the motion; a product with zero has that derivative
+        slope = at.stage(at["slope 0 0"], at["bend"] / 2 * e1)
+        still = at.stage(e1, 0.0)
+        force = at.stage(at["force"], line(0, slope, e1 - still))
+        new = [
+            at.stage(at[f"new {k}"], line(1 + k, at[f"slope {1 + k} 0"], e1))
+            for k in range(self.variables)
+        ]
         energy = at["new energy"]
         state = {f"state {k}": x for k, x in enumerate(new)} | {"energy": energy, "e": e1}
         lost = {"functions": work - (energy - at["energy"])}
@@ -371,6 +388,14 @@ class FunctionBlock(ConnectorBlock):
     def resume(self, q: Array) -> None:
         """See the base class."""
         self.start(q)
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """See the base class."""
+        bend = self.input("bend")
+        for i, (law, e) in enumerate(zip(self._laws, self.motion(q1), strict=True)):
+            bend[divmod(i, BATCH)] = -law.bend(float(e))
+        super().add_tangent_change(q1, u)
+        bend.fill(0.0)
 
     def complete_derivatives(self, c: Any, neighbours: Neighbours, by_number: Array) -> None:
         """Let C call a function that computes tables of the laws by differences."""

@@ -519,39 +519,71 @@ class Kernels:
         return function, conditions
 
     @cached_property
+    def change(self) -> Any:
+        """Derivatives of ``tangent`` along motions, which are further inputs; None if zero."""
+
+        def state() -> Stated:
+            made, at, names, along = self._stated_along()
+            slopes = at.slopes(expanded(made.forces), names)
+            changes = at.along([slopes[i * len(names) + j] for i, j in self.entries], names, along)
+            return self._as_stated(at, [without_zeros(changes)])
+
+        return self._compiled("change", state)[0][0]
+
+    @cached_property
     def motion_rates(self) -> Any:
         """Derivatives of the motions of laws along motions, which are further inputs."""
 
         def state() -> Stated:
-            names, along = self._along()
-            made, at = self._stated([*self._statement.inputs, *along])
-            return self._as_stated(at, [at.along(made.motions, names, [at[x] for x in along])])
+            made, at, names, along = self._stated_along()
+            return self._as_stated(at, [at.along(made.motions, names, along)])
 
         return self._compiled("motion rates", state)[0][0]
 
     @cached_property
     def tangent_work(self) -> Any:
-        """Work y·(K x) of the tangent K; the motions x and y are further inputs; None if zero.
+        """Work y·(K x) of the tangent K; the motions x and y are further inputs."""
+        return self._work(2)
 
-        Motions are q1 + a x with an input a of zero, by which the work is derived: relative motions
-        of x are computed before stiffnesses multiply them.
+    @cached_property
+    def change_of_tangent_work(self) -> Any:
+        """Derivative of :attr:`tangent_work` along motions, which are further inputs; None if 0."""
+        return self._work(3)
+
+    def _work(self, directions: int) -> Any:
+        """Compile a work of motions x, y and, with 3 directions, u.
+
+        Motions are q1 + a x + b u, with inputs a and b of zero, by which the work is derived:
+        relative motions of x and u are computed before stiffnesses multiply them.
         """
 
         def state() -> Stated:
-            names, x, y = *self._along(), self._along(1)[1]
-            at = self._inputs([*self._statement.inputs, *x, *y, "part"])
-            for name, along in zip(names, x, strict=True):
-                at[name] = at[name] + at["part"] * at[along]
+            parts = [f"part{k}" for k in range(directions - 1)]
+            names, along = self._along(directions)
+            some = [x for direction in along for x in direction]
+            at = self._inputs([*self._statement.inputs, *some, *parts])
+            x, y, *u = ([at[name] for name in direction] for direction in along)
+            for k, name in enumerate(names):
+                terms = (at[part] * one[k] for part, one in zip(parts, (x, *u), strict=True))
+                at[name] = sum(terms, at[name])
             forces = self._statement.equations(at).forces
-            work = expanded([sum((f * at[v] for f, v in zip(forces, y, strict=True)), 0)])
-            return self._as_stated(at, [without_zeros(expanded(at.slopes_by(work, [at["part"]])))])
+            work = expanded([sum((f * v for f, v in zip(forces, y, strict=True)), 0)])
+            for part in parts:
+                work = expanded(at.slopes_by(work, [at[part]]))
+            return self._as_stated(at, [without_zeros(work)])
 
-        return self._compiled("tangent work", state)[0][0]
+        return self._compiled(f"work of {directions} motions", state)[0][0]
 
-    def _along(self, direction: int = 0) -> tuple[list[str], list[str]]:
-        """Return names of the motions after the step, and of motions in a direction."""
+    def _along(self, directions: int) -> tuple[list[str], list[list[str]]]:
+        """Return names of the motions after the step, and of motions in directions."""
         names = [f"q1 {name}" for name in self._statement.unknowns]
-        return names, [f"along{direction} {x}" for x in names]
+        return names, [[f"along{k} {x}" for x in names] for k in range(directions)]
+
+    def _stated_along(self) -> tuple[Equations, Inputs, list[str], list[Expr]]:
+        """Return equations, inputs, names of the motions after the step, and their direction."""
+        names, (along,) = self._along(1)
+        made, at = self._stated([*self._statement.inputs, *along])
+        return made, at, names, [at[x] for x in along]
 
 
 kernels = lru_cache(maxsize=1024)(Kernels)

@@ -443,6 +443,13 @@ class StepEquation:
                     term.add_tangent(q)
         return r, self.A.data.copy()
 
+    def tangent_change(self, q: Array, u: Array) -> Array:
+        """Return ``data`` of the derivative along ``u`` of the tangent of inner terms and loads."""
+        self.A.data.fill(0.0)
+        for term in (*self.inner, *self.loads):
+            term.add_tangent_change(q, u)
+        return self.A.data.copy()
+
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
         """Return xᵀ K y for each pair of columns of X and Y, K as in :meth:`linearize`; (n,); J."""
         self.A.data.fill(0.0)
@@ -454,6 +461,29 @@ class StepEquation:
             beam_work = sum(cells.tangent_work(q, x, y) for cells in self.cells)
             works[i] = beam_work + times(x) @ y
         return works
+
+    def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
+        """Return the symmetric matrices Xᵀ K Y and Xᵀ K' Y; J.
+
+        K is the tangent of beams, connectors and loads, and K' is its derivative along ``u``.  Only
+        the upper triangles are computed.
+        """
+        works = np.zeros((2, X.shape[1], Y.shape[1]))
+        for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
+            x, y = (np.ascontiguousarray(column) for column in (X[:, i], Y[:, j]))
+            works[0, i, j] = sum(cells.tangent_work(q, x, y) for cells in self.cells)
+            works[1, i, j] = sum(cells.tangent_work(q, x, y, u) for cells in self.cells)
+        for k, work in enumerate(works):
+            self.A.data.fill(0.0)
+            for term in (*self.connector_terms, *self.loads):
+                if k == 0:
+                    term.add_tangent(q)
+                else:
+                    term.add_tangent_change(q, u)
+            times = Product(self.A)
+            work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
+            work += np.triu(work, 1).T
+        return works[0], works[1]
 
 
 def equation_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> StepEquation:

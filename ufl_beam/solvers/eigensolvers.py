@@ -111,6 +111,18 @@ def quadratic(
     return _solved(solver, size, n, shift)
 
 
+def small(A: Array, B: Array) -> tuple[Complex, Complex]:
+    """Compute all finite eigenvalues of a small symmetric ``A x = λ B x``, with eigenvectors.
+
+    The unknowns may have any units.  The results have the shapes (n,) and (size, n).
+    """
+    sizes = np.sqrt(np.abs(A.diagonal()) + np.abs(B.diagonal()))
+    scale = 1 / np.where(sizes > 0, sizes, 1.0)
+    across = np.outer(scale, scale)
+    θ, x = _inverse(A * across, B * across)
+    return 1 / θ, scale[:, None] * x
+
+
 def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
     """Compute the nonzero eigenvalues of A⁻¹ B, the largest first, and their eigenvectors."""
     θ, x = np.linalg.eig(np.linalg.solve(A, B))

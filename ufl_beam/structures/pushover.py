@@ -481,7 +481,7 @@ def pushover(
         )
     unit = [with_amplitude(load, Proportional(size_of(load) / sum_of_forces)) for load in loads]
     loaded = replace(steady, loads=[*steady.loads, *unit])
-    linear = Linearization(loaded, start, abs(sum_of_forces), mesh).linear_change("pushover")
+    linear = Linearization(loaded, start, abs(sum_of_forces), mesh).linear_change("pushover")[0]
     moved = float(values_at(numbering, place, linear[None])[0, axis])
     if not abs(moved) > LEAST_MOTION * np.abs(linear[numbering.dofs[:, : len(names)]]).max():
         raise ArgumentError(

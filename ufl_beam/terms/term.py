@@ -112,6 +112,9 @@ class Term(ABC):
         if tangent is not None:
             tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent along ``u`` at constant internal variables."""
+
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
 

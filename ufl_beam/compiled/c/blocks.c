@@ -475,10 +475,11 @@ double missed_by_block(void *self, const double *q, const double *r, double scal
   return most;
 }
 
-/* The outputs of a function at q that depends on directions, too. w is space for all inputs of the function, which end
- * with the motions in the directions and with numbers that remain. */
+/* The outputs of a function at q that depends on directions, too; with a tangent, add them to entries. w is space for
+ * all inputs of the function, which end with the motions in the directions and with numbers that remain. */
 void evaluate_along(const element_block *b, const element_function *f, const double *q, int directions,
-                    const double *const *direction, int width, double *w, double *out)
+                    const double *const *direction, int width, double *w, double *out, const int32_t *entry,
+                    double *tangent)
 {
   element_block more = *b;
   more.w = w, more.width = width;
@@ -487,6 +488,7 @@ void evaluate_along(const element_block *b, const element_function *f, const dou
   gather(&more, q, 0);
   for (int k = 0; k < directions; ++k) gather(&more, direction[k], b->width + k * b->unknowns);
   evaluate(&more, f, out);
+  if (tangent) scatter(b, f, f->outputs, out, entry, tangent);
 }
 
 /* Begin a step in a neighbouring scene from the state that its statement has at the configuration of the run. */

@@ -674,7 +674,8 @@ void set_numbers_of_step(const element_block *b, const time_step *step);
 void end_step_of_block(const element_block *b, const double *q, enum end_of_step what);
 void respond_springs(const element_block *b, const double *q);
 void evaluate_along(const element_block *b, const element_function *f, const double *q, int directions,
-                    const double *const *direction, int width, double *w, double *out);
+                    const double *const *direction, int width, double *w, double *out, const int32_t *entry,
+                    double *tangent);
 
 /* Vectors of loads at some degrees of freedom times functions of time, see DeadLoads. */
 typedef struct {
