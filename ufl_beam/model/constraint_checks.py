@@ -190,6 +190,9 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     for number, gradient in enumerate(combined):
         for dof, factor in gradient.items():
             columns[dof].append((number, factor))
+    alone = {entries[0][0] for entries in columns.values() if len(entries) == 1}
+    if len(alone) == len(rows):  # each constraint has a degree of freedom of its own
+        return [], np.zeros((0, 0))
     return rows, _null_space([*columns.values()], len(rows))
 
 
