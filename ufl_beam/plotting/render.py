@@ -391,8 +391,8 @@ class Solids:
     def corners(self, shape: DeformedShape) -> Array:
         """Return corners of cross-sections at both ends of cells; (num_cells, 2, 4, 3); m.
 
-        Beams have the depth of the section.  In the plane their width is the depth or more, in
-        space that of a rectangle with the bending stiffnesses of the section.
+        Beams have the depth of the section.  In the plane their width is the depth or more.  In
+        space it is the width of a rectangle with the bending stiffnesses of the section.
         """
         numbering, size = self.solution.numbering, self.solution.scene.size
         halves = []

@@ -416,7 +416,7 @@ class IbarraKrawinkler(_DeterioratingHinge):
             infinity, means no deterioration, here and below.
         softening: Λ of the strength after capping; rad or m.
         unloading: Λ of the unloading stiffness; rad or m.
-        exponent: AtLeastOne c, at least 1.
+        exponent: Exponent c, at least 1.
 
     Raises:
         ModelError: A number is out of range, the hardening exceeds half the stiffness, or the
@@ -449,7 +449,7 @@ class PinchingHinge(_DeterioratingHinge):
     Args:
         stiffness, backbone, negative: As of :class:`IbarraKrawinkler`, like the next two rows.
         strength, softening, unloading: Reference rotations Λ; rad or m.
-        exponent: AtLeastOne c, at least 1.
+        exponent: Exponent c, at least 1.
         kappa_F: Factor κF of the moment where both lines meet, above 0 and at most 1.
         kappa_D: Factor κD of the rotation there, from 0 to 1.
         reloading: Λ of the accelerated deterioration of the reloading stiffness; rad or m.
