@@ -324,6 +324,17 @@ def test_what_is_beyond_the_scope_is_refused_by_name(scene, scheme, words):
         run(scene, scheme, 0.1, 0.05)
 
 
+def test_lumped_mass():
+    scene, mesh = clamped(BEAM), ub.Mesh(lumped=True)
+    load = ub.PointLoad(scene.beams[0].end, force=(0, -30.0))
+    scene = replace(scene, loads=[load])
+    found, expected = (
+        run(scene, ub.EnergyMomentum(), 0.2, 0.02, mesh=mesh, reference=reference)
+        for reference in (True, False)
+    )
+    assert np.abs(found.q - expected.q).max() < 1e-9 * np.abs(expected.q).max()
+
+
 def test_meshes_beyond_the_scope():
     with raises("a mesh of degree above 1"):
         run(clamped(BEAM), ub.EnergyMomentum(), 0.1, 0.05, mesh=ub.Mesh(degree=2))

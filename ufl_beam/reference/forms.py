@@ -54,6 +54,7 @@ class Fields:
         of the potential by q1; other schemes take strains at t_n+θ, and variations of their own.
         """
         V, axis, dx, θ = self.q0.function_space, Axis(self.mesh), self.dx(1), scheme.theta
+        dx_of_mass = self.dx(1, "GLL") if self.numbering.mesh.lumped else self.dx(2)
 
         def W(e: Expr) -> Expr:
             return functional.elastic_energy(e - self.plastic, self.stiffness)  # equation (35)
@@ -70,7 +71,7 @@ class Fields:
             return virtual_work(r, variation(w)) * dx
 
         def mass(w: Expr, a: Expr) -> ufl.Form:
-            kinetic = functional.kinetic_energy(self.v, self.inertia) * self.dx(2)  # equation (18)
+            kinetic = functional.kinetic_energy(self.v, self.inertia) * dx_of_mass  # equation (18)
             return ufl.derivative(ufl.derivative(kinetic, self.v, w), self.v, a)  # equation (67)
 
         def stiffness_at_rest(w: Expr, v: Expr) -> ufl.Form:
@@ -88,9 +89,13 @@ class Fields:
         self.stiffness_at_rest = compile_form(stiffness_at_rest(w, dq))
         self.strains, self.resultants = map(self._evaluation, (strain(self.q1, axis), r))
 
-    def dx(self, degree: int) -> ufl.Measure:
-        """Return the measure with Gauss points for a degree; with degree 1, one in each cell."""
-        return ufl.Measure("dx", self.mesh, metadata={"quadrature_degree": degree})
+    def dx(self, degree: int, rule: str = "default") -> ufl.Measure:
+        """Return the measure with Gauss points for a degree, or with "GLL" with points at nodes.
+
+        With degree 1, there is one Gauss point in each cell.
+        """
+        chosen = {"quadrature_degree": degree, "quadrature_rule": rule}
+        return ufl.Measure("dx", self.mesh, metadata=chosen)
 
     def cellwise(self, shape: Sequence[int]) -> fem.Function:
         """Create a function that is constant in each cell."""
